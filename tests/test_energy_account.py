@@ -13,7 +13,16 @@ import pytest
 
 from scalpel_sim.bench.random_strokes import STROKE_DT, random_stroke
 from tests.bodies import sides
-from tissue import BladeShape, BladeSweep, Energies, Material, SolverSettings, Tissue, block
+from tissue import (
+    BladeSegment,
+    BladeShape,
+    BladeSweep,
+    Energies,
+    Material,
+    SolverSettings,
+    Tissue,
+    block,
+)
 from tissue.energy_audit import MeshChanges
 
 SIZE = (0.04, 0.04, 0.02)
@@ -131,10 +140,10 @@ def test_finer_tetrahedra_hold_little_more_elastic_energy_and_never_less(account
 
 
 def test_a_cut_adds_little_to_the_anchors_whose_tetrahedra_it_divides(account):
-    """Measured 0.07 % of the work, and 0.02 % in one step."""
+    """Measured 0.12 % of the work; one step of springs has all of it: see `docs/forces.md`."""
     added = account.added("edge")
     assert abs(added.sum()) < 2e-3
-    assert np.abs(added).max() < 1e-3
+    assert np.abs(added).max() < 2e-3
 
 
 def test_nothing_breaks_where_the_skin_is_as_tough_as_the_rest(account):
@@ -160,3 +169,44 @@ def test_the_blade_releases_more_than_it_finds_bent(account):
     released = account.steps("released")
     assert released[released < 0.0].sum() > (-0.04 if account.is_of_springs else -0.015)
     assert 0.0 < released.sum() < 0.12
+
+
+@pytest.mark.parametrize("blade", [None, BladeShape()])
+@pytest.mark.parametrize("relaxation", ["global", "verlet"])
+def test_a_blade_that_is_dragged_sideways_and_back_gains_no_energy(relaxation, blade):
+    """As a hand drags it, at random. At most 0.4 % of the net work was measured.
+
+    Where the edge comes back beside where it cut, its springs used to pull at once: with a line for
+    a blade they gave the body five times the work of the blade, out of nothing.
+    """
+    mesh = block((8, 8, 4), SIZE)
+    material = Material(young_modulus=30e3, poisson_ratio=0.45, toughness=20.0, blade_friction=0.2)
+    solver = SolverSettings(relaxation=relaxation, audit=True)
+    tissue = Tissue(mesh, material, fixed=sides(mesh), blade=blade, solver=solver)
+    tissue.settle()
+    random, lowest, highest = np.random.default_rng(3), [0.01, 0.005, -0.002], [0.03, 0.03, 0.004]
+    way = [np.array([0.021, -0.003, 0.0]), np.array([0.021, 0.022, 0.0])]
+    for _ in range(6):
+        step = random.normal(0.0, [0.003, 0.006, 0.001])
+        way.append(np.clip(way[-1] + step, lowest, highest))
+    sweeps = itertools.starmap(BladeSweep, itertools.pairwise(upright_edges(way)))
+    account = [tissue.step(sweep, DRAG_DT).energies for sweep in sweeps]
+    work = account[-1].work_of_blade
+    # Samples that take hold beside others find tissue that is bent: 3.7 % of the work.
+    assert min(energies.released for energies in account) > -0.05 * work
+    assert max(abs(energies.residual) for energies in account) < CLOSED * work
+
+
+DRAG_DT, DRAG_SPEED = 1e-3, 0.05
+"""Time step [s] and speed [m/s] of a drag."""
+
+UP = np.array([0.0, 0.0, 0.03])
+"""From the tip of the edge that is dragged to its heel [m]."""
+
+
+def upright_edges(way):
+    """Yield an edge of 30 mm after each time step along straight lines between points [m]."""
+    for a, b in itertools.pairwise(way):
+        for part in np.linspace(0.0, 1.0, round(np.linalg.norm(b - a) / DRAG_SPEED / DRAG_DT)):
+            tip = a + part * (b - a)
+            yield BladeSegment(tip, tip + UP, np.array([0.0, 1.0, 0.0]))

@@ -366,7 +366,7 @@ class Tissue(RepeatedSteps):
             self._chunks = None
             self._audit.forget()
             nodes = self._touched[:n]
-            system.mesh_changed(change, nodes)
+            system.mesh_changed(change, nodes, *self._edge_now)
             self._integrator.mesh_changed(nodes)
             self._hold_again()
         self._make_room()

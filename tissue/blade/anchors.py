@@ -16,7 +16,7 @@ from tissue.blade.walls import Walls, new_walls
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays
-from tissue.core.vec3 import Vec3, axpy, dot, norm, scale, sub
+from tissue.core.vec3 import Vec3, axpy, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import interpolate
 from tissue.material import Material
 from tissue.mesh.body import Body
@@ -65,6 +65,16 @@ class Anchors(Arrays):
     pulls: BoolArray
     """Whether the energy of the anchor is in the account: the edge was not behind it where slip was
     applied last, or where the anchor was set; shape (n,)."""
+    offset: FloatArray
+    """Distance along the normal of the blade by which the edge has moved aside of the anchor while
+    it was behind it [m], shape (n,): the plastic part of the stretch across the blade. Else an edge
+    that comes back beside where it cut would pull at once, with energy out of nothing."""
+    energy: FloatArray
+    """Energy of the anchor there [J], shape (n,); 0 where it does not pull."""
+    stretch: FloatArray
+    """Vector from the anchor to its sample there [m], shape (n, 3)."""
+    impulse: FloatArray
+    """Impulse of the anchor on the tissue since then [N s], shape (n, 3)."""
     speed: FloatArray
     """Forward speed of the sample of the edge in this step [m/s], shape (n,). It decides the
     toughness. With the speed of the anchor itself, from one short step to the next, the anchor
@@ -122,6 +132,10 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         at_skin=np.zeros(n, dtype=np.bool_),
         is_new=np.zeros(n, dtype=np.bool_),
         pulls=np.zeros(n, dtype=np.bool_),
+        offset=np.zeros(n),
+        energy=np.zeros(n),
+        stretch=np.zeros((n, 3)),
+        impulse=np.zeros((n, 3)),
         speed=np.zeros(n),
         rest_share=np.ones(n),
         rest_area=np.zeros((n, 3)),
@@ -154,6 +168,16 @@ def anchor_position(anchors: Anchors, body: Body, positions: FloatArray, k: int)
         return p
     q = interpolate(weights_of(coarse.weights, k), positions, coarse.nodes, k)
     return axpy(share, sub(q, p), p)
+
+
+@kernel
+def pulling_point(anchors: Anchors, pose: BladePose, k: int) -> Vec3:
+    """Return the point of the blade that pulls on anchor `k` [m]: its sample, or beside that."""
+    b = sample_point(pose, k, len(anchors.state))
+    offset = anchors.offset[k]
+    if offset == 0.0:
+        return b
+    return axpy(-offset, pose.normal, b)
 
 
 @inlined
@@ -234,6 +258,47 @@ def stored_energy(
     return energy_of_spring(stiffness, stretch, surplus)
 
 
+@kernel
+def begin_account(
+    anchors: Anchors, k: int, stretch: Vec3, pose: BladePose, law: ToughnessLaw
+) -> None:
+    """Note what an anchor holds, from where its work is counted next.
+
+    Args:
+        anchors: The samples.
+        k: The anchor.
+        stretch: Vector from the anchor to the point of the blade that pulls on it [m].
+        pose: Pose of the blade.
+        law: Toughness of the tissue.
+    """
+    pulls = dot(stretch, pose.forward) >= 0.0
+    anchors.pulls[k] = pulls
+    anchors.energy[k] = stored_energy(anchors, k, stretch, pose, law) if pulls else 0.0
+    store(anchors.stretch, k, stretch)
+    store(anchors.impulse, k, Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def energy_given(anchors: Anchors, k: int, stretch: Vec3, seconds: float) -> float:
+    """Return what an anchor held when its account began and the work done on it since then [J].
+
+    The work is that of the mean force over the change of its stretch. Where an anchor begins or
+    ends to pull within a step, the stages of the integrator saw it pull in some of them alone, and
+    neither what it held before nor what it holds afterwards is what it gave.
+
+    Args:
+        anchors: The samples.
+        k: The anchor.
+        stretch: Vector from the anchor to its sample now [m].
+        seconds: Time since the account began [s].
+    """
+    energy: float = anchors.energy[k]
+    if seconds == 0.0:
+        return energy
+    change = sub(stretch, vec3(anchors.stretch, k))
+    return energy + dot(vec3(anchors.impulse, k), change) / seconds
+
+
 @inlined
 def energy_of_spring(stiffness: float, stretch: Vec3, surplus: Vec3) -> float:
     """Return the energy of a spring [J] from its stretch and the surplus of that [m]."""
@@ -249,7 +314,7 @@ def anchors_energy(anchors: Anchors, body: Body, pose: BladePose, law: Toughness
     for k in range(n):
         if anchors.state[k] == ANCHORED:
             a = anchor_position(anchors, body, body.positions, k)
-            stretch = sub(sample_point(pose, k, n), a)
+            stretch = sub(pulling_point(anchors, pose, k), a)
             if dot(stretch, pose.forward) >= 0.0:
                 energy += stored_energy(anchors, k, stretch, pose, law)
     return energy

@@ -6,14 +6,15 @@ from tissue.blade.anchors import (
     holding_node,
     holding_weight,
     n_holding_nodes,
+    pulling_point,
     surplus_stretch,
 )
 from tissue.blade.blade_state import BladeState
-from tissue.blade.edge import BladeMotion, displacement_of, sample_point
+from tissue.blade.edge import BladeMotion, displacement_of
 from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import dot, scale, sub
+from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
 from tissue.mesh.body import Body
 
 
@@ -47,12 +48,13 @@ def apply_edge_forces(
     for k in range(n):
         if anchors.state[k] != ANCHORED:
             continue
-        b = sample_point(pose, k, n)
+        b = pulling_point(anchors, pose, k)
         stretch = sub(b, anchor_position(anchors, body, positions, k))
         if dot(stretch, pose.forward) < 0.0:
             continue  # backed off: an edge pushes, and does not pull
         surplus = surplus_stretch(anchors, k, stretch, pose, blade.toughness)
         force = scale(anchors.stiffness[k], sub(stretch, surplus))
+        store(anchors.impulse, k, axpy(seconds, force, vec3(anchors.impulse, k)))
         for i in range(n_holding_nodes(anchors, k)):
             node, weight = holding_node(anchors, body, k, i), holding_weight(anchors, k, i)
             running = add_to_node(external, running, node, weight, force, seconds)

@@ -11,7 +11,8 @@ from tissue.blade.anchors import (
     RETRACTED,
     Anchors,
     anchor_position,
-    stored_energy,
+    begin_account,
+    pulling_point,
 )
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
@@ -133,9 +134,10 @@ def anchor_beside(
             join_wall(anchors.walls, k, beside)
             anchors.rest_share[k] = anchors.rest_share[beside]
             store(anchors.rest_area, k, vec3(anchors.rest_area, beside))
-            anchors.pulls[k] = dot(stretch, pose.forward) >= 0.0
-            if anchors.pulls[k]:
-                blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
+            anchors.offset[k] = anchors.offset[beside]
+            stretch = sub(pulling_point(anchors, pose, k), here)
+            begin_account(anchors, k, stretch, pose, blade.toughness)
+            blade.totals.released -= anchors.energy[k]
 
 
 @kernel
@@ -240,6 +242,9 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     anchors.slipped[k] = False
     anchors.is_new[k] = True
     anchors.pulls[k] = True
+    anchors.offset[k] = anchors.energy[k] = 0.0
+    store(anchors.stretch, k, Vec3(0.0, 0.0, 0.0))
+    store(anchors.impulse, k, Vec3(0.0, 0.0, 0.0))
     anchors.rest_share[k] = 1.0
     store(anchors.rest_area, k, Vec3(0.0, 0.0, 0.0))
     anchors.at_skin[k] = at_skin

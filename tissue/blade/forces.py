@@ -129,7 +129,7 @@ def apply_slip(
     """
     clear_blade_forces(blade, body, external)  # before anchors move to other nodes
     pose = pose_at(edge, when)
-    slip_anchors(blade, body, visits, pose)
+    slip_anchors(blade, body, visits, pose, seconds)
     apply_sliding(blade, pose, body.positions, seconds)
     slip_blunt_sides(blade, body, visits, pose)
 

@@ -166,9 +166,19 @@ class BladeInteraction:
         """Make room for that many tetrahedra."""
         self.state = self.state.replaced(sides=grown_side_contacts(self.state.sides, n_tetrahedra))
 
-    def mesh_changed(self, body: Body, visits: Visits, change: Change) -> None:
-        """Find the tetrahedra of the anchors again after a pass of a cut."""
-        relocate(self.state, body, visits)
+    def mesh_changed(
+        self, body: Body, visits: Visits, change: Change, edge: Edge, when: float
+    ) -> None:
+        """Find the tetrahedra of the anchors again after a pass of a cut.
+
+        Args:
+            body: The body.
+            visits: For searches.
+            change: What the pass changed.
+            edge: The cutting edge over the time step.
+            when: Instant of the pass, as a fraction of it.
+        """
+        relocate(self.state, body, visits, edge, when)
         relocate_blunt_sides(self.state, body, visits)
         if self._shape is not None:
             forget_changed_faces(self.state.sides, body, change.dirty, change.n_dirty)

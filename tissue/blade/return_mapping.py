@@ -11,8 +11,11 @@ from tissue.blade.anchors import (
     RETRACTED,
     Anchors,
     anchor_position,
+    begin_account,
+    energy_given,
     energy_of_spring,
     held_toughness,
+    pulling_point,
     stored_energy,
     surplus_stretch,
 )
@@ -23,7 +26,7 @@ from tissue.blade.coarse_hold import (
     move_coarse_hold,
     store_weights,
 )
-from tissue.blade.edge import BladePose, sample_point
+from tissue.blade.edge import BladePose, Edge, pose_at
 from tissue.blade.material_frame import way_at_rest
 from tissue.blade.rest_area import update_rest_share
 from tissue.core.array_types import IntArray
@@ -143,10 +146,19 @@ def _hold(anchors: Anchors, body: Body, k: int, t: int, weights: Weights) -> Non
 
 
 @kernel
-def relocate(blade: BladeState, body: Body, visits: Visits) -> None:
-    """Find the anchors' tetrahedra again after the mesh changed. Material points do not move."""
-    anchors = blade.anchors
-    for k in range(len(anchors.state)):
+def relocate(blade: BladeState, body: Body, visits: Visits, edge: Edge, when: float) -> None:
+    """Find the anchors' tetrahedra again after the mesh changed. Material points do not move.
+
+    Args:
+        blade: The anchors are written.
+        body: The tissue.
+        visits: For searches.
+        edge: The cutting edge over the time step.
+        when: Instant of the change, as a fraction of the time step.
+    """
+    anchors, pose = blade.anchors, pose_at(edge, when)
+    n = len(anchors.state)
+    for k in range(n):
         if anchors.state[k] == ANCHORED or anchors.state[k] == RETRACTED:
             state = anchors.state[k]
             p = vec3(anchors.rest, k)
@@ -155,6 +167,10 @@ def relocate(blade: BladeState, body: Body, visits: Visits) -> None:
                 begin_coarse_hold(anchors.coarse, k, anchors.nodes, anchors.weights)
             set_anchor(anchors, body, k, location.tetrahedron, p)
             anchors.state[k] = state
+            if state == ANCHORED:  # what the change of the mesh did to its energy is no work
+                a = anchor_position(anchors, body, body.positions, k)
+                stretch = sub(pulling_point(anchors, pose, k), a)
+                begin_account(anchors, k, stretch, pose, blade.toughness)
 
 
 @kernel
@@ -167,11 +183,20 @@ def _has_nodes(body: Body, t: int, nodes: IntArray, k: int) -> bool:
 
 
 @kernel
-def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
+def slip_anchors(
+    blade: BladeState, body: Body, visits: Visits, pose: BladePose, seconds: float
+) -> None:
     """Slip every anchor whose pull exceeds toughness times length (return mapping).
 
-    An anchor from which the blade backs off is retracted; when the blade comes back, the anchor
-    pulls again.
+    An anchor from which the blade backs off is retracted, and lets it move aside; when the blade
+    comes back, the anchor pulls again.
+
+    Args:
+        blade: Anchors and totals are written.
+        body: The tissue.
+        visits: For searches.
+        pose: Pose of the blade.
+        seconds: Time since the last call [s].
     """
     anchors, totals = blade.anchors, blade.totals
     n = len(anchors.state)
@@ -179,13 +204,12 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
         if anchors.state[k] != ANCHORED and anchors.state[k] != RETRACTED:
             continue
         a = anchor_position(anchors, body, body.positions, k)
-        stretch = sub(sample_point(pose, k, n), a)
+        stretch = sub(pulling_point(anchors, pose, k), a)
         if dot(stretch, pose.forward) < 0.0:
-            if anchors.pulls[k]:  # what remained as its pull in the plane of the blade fell to zero
-                beside = dot(stretch, pose.normal)
-                totals.released += 0.5 * anchors.stiffness[k] * beside * beside
-                anchors.pulls[k] = False
-            is_far = abs(dot(stretch, pose.normal)) > blade.reach
+            if anchors.pulls[k]:
+                totals.released += energy_given(anchors, k, stretch, seconds)
+            _end_slip(blade, body, k, pose)
+            is_far = abs(anchors.offset[k]) > blade.reach
             anchors.state[k] = FREE if is_far else RETRACTED
             continue
         if anchors.state[k] == RETRACTED:
@@ -194,9 +218,24 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
                 continue
             anchors.state[k] = ANCHORED
         if not anchors.pulls[k]:
+            totals.released += energy_given(anchors, k, stretch, seconds)
             totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
-            anchors.pulls[k] = True
         _slip_anchor(blade, body, visits, k, a, stretch, pose)
+        if anchors.state[k] == ANCHORED:
+            _end_slip(blade, body, k, pose)
+
+
+@kernel
+def _end_slip(blade: BladeState, body: Body, k: int, pose: BladePose) -> None:
+    """Begin the account of an anchor again; one behind the edge lets that move aside."""
+    anchors = blade.anchors
+    a = anchor_position(anchors, body, body.positions, k)
+    stretch = sub(pulling_point(anchors, pose, k), a)
+    if dot(stretch, pose.forward) < 0.0:
+        aside = dot(stretch, pose.normal)
+        anchors.offset[k] += aside
+        stretch = axpy(-aside, pose.normal, stretch)
+    begin_account(anchors, k, stretch, pose, blade.toughness)
 
 
 @kernel
@@ -214,7 +253,7 @@ def _slip_anchor(
         visits: For searches.
         k: The anchor.
         a: Where it is in the deformed body [m].
-        stretch: Vector from there to its sample of the edge [m].
+        stretch: Vector from there to the point of the blade that pulls on it [m].
         pose: Pose of the blade.
     """
     anchors, totals, law = blade.anchors, blade.totals, blade.toughness
@@ -240,7 +279,6 @@ def _slip_anchor(
         anchors.cut[k] += share * surplus * across
         totals.work_of_cutting += spent
         totals.released += before - spent
-        anchors.pulls[k] = False
         return
     # Where the tissue is very distorted an anchor slips less far than asked.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
@@ -250,7 +288,6 @@ def _slip_anchor(
         anchors.tetrahedron[k] = t
         anchors.state[k] = LEFT
         totals.released += before
-        anchors.pulls[k] = False
         return
     area = across * dot(slipped, in_plane) / distance
     cost = held_toughness(anchors, k, law) * area
@@ -263,9 +300,8 @@ def _slip_anchor(
     update_rest_share(anchors, k, way, slipped, pose, blade.reach)
     at = anchor_position(anchors, body, body.positions, k)
     stretch = sub(add(a, stretch), at)
-    anchors.pulls[k] = dot(stretch, pose.forward) >= 0.0
     totals.released += left
-    if anchors.pulls[k]:
+    if dot(stretch, pose.forward) >= 0.0:
         totals.released -= stored_energy(anchors, k, stretch, pose, law)
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.anchors import ANCHORED, anchor_position, surplus_stretch
+from tissue.blade.anchors import ANCHORED, anchor_position, pulling_point, surplus_stretch
 from tissue.blade.blade_state import BladeState
 from tissue.blade.blunt_contact import (
     PRESSING,
@@ -18,7 +18,7 @@ from tissue.blade.blunt_contact import (
     press_of,
     touched_point,
 )
-from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at, sample_point
+from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
 from tissue.blade.impulse_totals import ImpulseTotals
 from tissue.blade.side_contact import (
     POINTS,
@@ -239,7 +239,7 @@ def _report_edge(
     for k in range(n):
         if anchors.state[k] != ANCHORED:
             continue
-        b = sample_point(pose, k, n)
+        b = pulling_point(anchors, pose, k)
         stretch = sub(b, anchor_position(anchors, body, body.positions, k))
         if dot(stretch, forward) < 0.0:
             continue

@@ -191,12 +191,19 @@ class System:
             if self._increments_to_pieces == 0:
                 self.find_loose_pieces()
 
-    def mesh_changed(self, change: Change, nodes: IntArray) -> None:
-        """Update what depends on the tetrahedra that a pass of a cut changed, and their nodes."""
+    def mesh_changed(self, change: Change, nodes: IntArray, edge: Edge, when: float) -> None:
+        """Update what depends on the tetrahedra that a pass of a cut changed, and their nodes.
+
+        Args:
+            change: What the pass changed.
+            nodes: Nodes of the tetrahedra that changed.
+            edge: The cutting edge over the time step.
+            when: Instant of the pass, as a fraction of it.
+        """
         if self._increments_to_pieces == 0:
             self._increments_to_pieces = INCREMENTS_TO_PIECES
         self.elasticity.mesh_changed(self.body, self.visits, change, nodes, len(nodes))
-        self.interaction.mesh_changed(self.body, self.visits, change)
+        self.interaction.mesh_changed(self.body, self.visits, change, edge, when)
         self.contact.mesh_changed(self.body, change)
         self.geoms.mesh_changed(self.body, change)
 

@@ -80,7 +80,7 @@ class AnchoredBlade:
         return self.blade.totals
 
     def slip(self, edge):
-        slip_anchors(self.blade, self.body, self.visits, pose_at(edge, 1.0))
+        slip_anchors(self.blade, self.body, self.visits, pose_at(edge, 1.0), 1.0)
 
 
 @pytest.fixture
@@ -223,20 +223,48 @@ STIFFNESS = 4.0 * STIFF * 0.016
 """Stiffness of all anchors together [N/m]."""
 
 
-def test_backing_off_releases_what_is_held_aside_and_nothing_else(held):
-    """An edge pushes and does not pull: ahead and along it holds nothing as it backs off."""
-    held.slip(edge_at(0.009 - 0.001, x=0.011 + 0.0005, z=0.001 + 0.0002))
-    assert held.blade.totals.released == pytest.approx(0.5 * STIFFNESS * 0.0005**2, rel=1e-9)
+ASIDE = 0.0005
+"""How far the edge is beside its anchors [m]."""
+
+HELD_ASIDE = 0.5 * STIFFNESS * ASIDE**2
+"""What the anchors hold there [J]."""
 
 
-def test_backing_off_and_coming_back_leaves_the_account_as_it_was(held):
-    aside = 0.011 + 0.0005
-    held.slip(edge_at(0.009 - 0.001, x=aside))
-    here = edge_at(0.009 + 1e-9, x=aside)
+def go_back_from_aside(held):
+    """Have the edge pull to the side, and back off from there."""
+    held.slip(edge_at(0.009 + 1e-9, x=0.011 + ASIDE))
+    held.slip(edge_at(0.009 - 0.001, x=0.011 + ASIDE))
+
+
+def come_back_aside(held):
+    """Have the edge back off, and come back beside where it cut; return where it is then."""
+    go_back_from_aside(held)
+    here = edge_at(0.009 + 1e-9, x=0.011 + ASIDE)
     held.slip(here)
-    stored = anchors_energy(held.anchors, held.body, pose_at(here, 1.0), held.blade.toughness)
-    assert stored == pytest.approx(0.5 * STIFFNESS * 0.0005**2, rel=1e-5)
-    assert held.blade.totals.released == pytest.approx(0.0, abs=1e-5 * stored)
+    assert (held.anchors.state == ANCHORED).all()
+    return here
+
+
+def test_backing_off_releases_what_was_held_aside(held):
+    go_back_from_aside(held)
+    assert held.blade.totals.released == pytest.approx(HELD_ASIDE, rel=1e-5)
+
+
+def test_an_edge_that_comes_back_beside_where_it_cut_begins_without_a_pull(held):
+    here = come_back_aside(held)
+    assert np.linalg.norm(held.pull(here).impulse) < 1e-4 * STIFFNESS * ASIDE
+    assert held.blade.totals.released == pytest.approx(HELD_ASIDE, rel=1e-5)
+
+
+@pytest.mark.parametrize("about", [(0.0, 0.0, 0.0), (0.3, -1.0, 2.0)])
+def test_forces_and_torques_cancel_for_an_edge_that_came_back_beside_where_it_cut(held, about):
+    come_back_aside(held)
+    totals = held.pull(deform(held))
+    assert np.linalg.norm(totals.impulse) > 0.1
+    on_blade = totals.angular_impulse - np.cross(about, totals.impulse)
+    on_nodes = np.cross(held.body.positions - about, held.forces).sum(axis=0)
+    np.testing.assert_allclose(held.forces.sum(axis=0) + totals.impulse, 0.0, atol=1e-14)
+    np.testing.assert_allclose(on_blade + on_nodes, 0.0, atol=1e-12)
 
 
 def test_an_anchor_that_is_set_behind_the_edge_is_in_the_account_once_it_pulls(held):
@@ -246,7 +274,7 @@ def test_an_anchor_that_is_set_behind_the_edge_is_in_the_account_once_it_pulls(h
     assert held.anchors.state[0] == ANCHORED
     assert held.blade.totals.released == 0.0
     held.anchors.state[1:] = FREE
-    slip_anchors(held.blade, held.body, held.visits, ahead)
+    slip_anchors(held.blade, held.body, held.visits, ahead, 1.0)
     stored = anchors_energy(held.anchors, held.body, ahead, held.blade.toughness)
     assert stored > 0.0
     assert held.blade.totals.released == pytest.approx(-stored, rel=1e-9)
@@ -400,7 +428,7 @@ def test_an_anchor_that_slips_to_the_other_lip_of_an_open_cut_lets_go(held, gap)
         set_anchor(held.anchors, body, k, walk(body, at, 0).tetrahedron, at)
     edge = pose_at(edge_at(0.021, x=0.003), 1.0)
     stored = anchors_energy(held.anchors, body, edge, held.blade.toughness)
-    slip_anchors(held.blade, body, no_visits(len(body.rest), len(body.tetrahedra)), edge)
+    slip_anchors(held.blade, body, no_visits(len(body.rest), len(body.tetrahedra)), edge, 1.0)
     if gap == 0.0:
         assert (held.anchors.state == ANCHORED).all()
         assert (held.anchors.rest[:, 1] > 0.02).all()

@@ -13,6 +13,7 @@ from tissue.blade.anchors import (
     new_anchors,
 )
 from tissue.blade.coarse_hold import OVERHANG, fade_coarse_hold, move_coarse_hold
+from tissue.blade.edge import Edge
 from tissue.blade.return_mapping import relocate, set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import build_body
@@ -23,6 +24,9 @@ pytestmark = pytest.mark.kernel
 BLOCK = block((2, 2, 2), (0.02, 0.02, 0.02))
 MIDDLE = np.array([0.4, 0.2, 0.2, 0.2])
 """Weights of the anchor in its tetrahedron: nearer to its first node than to the second."""
+
+
+EDGE = Edge(*(Vec3(0.01, 0.01, 0.0), Vec3(0.01, 0.01, 0.01), Vec3(0.0, 1.0, 0.0)) * 2)
 
 
 class HeldAnchor:
@@ -44,7 +48,7 @@ class HeldAnchor:
         for points in (self.body.rest, self.body.positions):
             points[new] = points[self.nodes[:2]].mean(axis=0)
         self.body.tetrahedra[0, 1] = new  # the part on the side of the first node
-        relocate(self.blade, self.body, self.visits)
+        relocate(self.blade, self.body, self.visits, EDGE, 0.0)
         return new
 
     def slip_to(self, weights):
@@ -109,5 +113,5 @@ def test_a_tetrahedron_that_the_anchor_has_left_far_behind_holds_nothing(held):
 
 
 def test_an_anchor_whose_tetrahedron_stays_is_held_by_four_nodes(held):
-    relocate(held.blade, held.body, held.visits)
+    relocate(held.blade, held.body, held.visits, EDGE, 0.0)
     assert n_holding_nodes(held.anchors, 0) == 4
