@@ -107,7 +107,7 @@ def perform(
             failure = _run_frames(
                 simulation, outputs, seconds, every_frame, controls, stop, checkpoints
             )
-        stopped = stop.reason
+        stopped, stop.is_writing = stop.reason, True
         status = _status_of(stopped, failure, controls)
         ended = EndedRun(simulation, outputs, replay, hand, start, settings, status, failure)
         summary, attempts = write_end(ended)

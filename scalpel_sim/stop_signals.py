@@ -47,6 +47,7 @@ class StopSignals:
     """While entered, the first signal sets `reason`; one more, later on, is raised as an exception.
 
     So a run ends between two frames with its files whole, and one that hangs can still be ended.
+    While `is_writing`, none is raised: what is being written would be lost.
     A signal that the process ignores stays ignored, as with `nohup`. Outside the main thread, where
     Python gets no signals, it does nothing.
     """
@@ -54,7 +55,9 @@ class StopSignals:
     def __init__(self) -> None:
         self.reason: str | None = raised_signal()
         """Which signal came, or None."""
-        self._noted_at = time.monotonic()
+        self.is_writing = False
+        """Whether the last files are being written."""
+        self._noted_at = self._last_at = time.monotonic()
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> "StopSignals":
@@ -80,11 +83,13 @@ class StopSignals:
         return 0.0 if self.reason is None else time.monotonic() - self._noted_at
 
     def _note(self, number: int, frame: FrameType | None) -> None:
-        now = time.monotonic()
+        before, self._last_at = self._last_at, time.monotonic()
         if self.reason is None:
-            self.reason, self._noted_at = interruption(number), now
-        elif now - self._noted_at > SAME_WISH:
-            raise SignalInterrupt(interruption(number))
+            self.reason, self._noted_at = interruption(number), self._last_at
+        elif self._last_at - before > SAME_WISH:
+            if not self.is_writing:
+                raise SignalInterrupt(interruption(number))
+            _tell(f"the last files are being written; kill -9 {os.getpid()} ends it without them")
 
 
 def interrupt_on_signals() -> None:
@@ -139,8 +144,12 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def _end(number: int) -> None:
-    # Not by `sys.stderr`, in the midst of whose writing it may be.
+    _tell(f"error: {interruption(number)}")
+    os._exit(EXIT_RUN_FAILED)
+
+
+def _tell(text: str) -> None:
+    """Write a line for the user; not by `sys.stderr`, in the midst of whose writing it may be."""
     with contextlib.suppress(OSError):  # nobody reads it any more
         shown = _SHOW_CURSOR if os.isatty(_STDERR) else ""
-        os.write(_STDERR, f"{shown}error: {interruption(number)}\n".encode())
-    os._exit(EXIT_RUN_FAILED)
+        os.write(_STDERR, f"{shown}{text}\n".encode())
