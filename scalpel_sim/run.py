@@ -1,7 +1,6 @@
 """One run, from a simulation at its start to a folder of files, however it ends."""
 
 import logging
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 from msgspec import structs
 
 from bridge import LinkError, TcpLink
-from scalpel_sim.errors import Interrupted, RunError, one_line
+from scalpel_sim.errors import Interrupted, RunError, UsageError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.resumption import RepeatedFrames
@@ -48,6 +47,9 @@ LONGEST_WAIT = 2.0
 MANY_SUBSTEPS = 200
 """Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
 
+MOST_SUBSTEPS = 20_000
+"""Runge-Kutta steps in a frame at most. With the organ it takes 5 s, and a signal waits as long."""
+
 
 def perform(
     simulation: Simulation,
@@ -78,6 +80,8 @@ def perform(
             rest after the hand has ended.
 
     Raises:
+        UsageError: a frame takes more than `MOST_SUBSTEPS`.
+        StateError: a run that goes on is made otherwise than it was.
         Interrupted: the user or the system ended the run.
         RunError: the run failed, or a file could not be written. The other files are.
     """
@@ -95,13 +99,11 @@ def perform(
             views=views,
             log=log,
         )
+        _check_number_of_steps(simulation)
         start = _begin(simulation, outputs, scene, hand)
         simulation.pictures.append(into_replay(replay))
-        _warn_if_slow(simulation)
         until = None if hand is not None else seconds
         with RunCheckpoints(outputs, simulation, replay, settings, until) as checkpoints:
-            if outputs.resumption is not None:
-                outputs.resumption.load_into(simulation)
             if controls is not None:
                 controls.history.begin(checkpoints, outputs, replay)
             failure = _run_frames(
@@ -149,13 +151,16 @@ def _raise_what_ended_it(
     kept = f"{folder} holds what was done"
     if attempts.unwritten:
         kept += f", but not {', '.join(dict.fromkeys(attempts.unwritten))}"
+    further = f"; --resume {folder} goes on from there" if can_go_on else ""
     if failure is not None:
-        raise RunError(f"after {time:.3f} s: {one_line(failure)}; {kept}") from failure
+        is_of_files = isinstance(failure.__cause__, OSError)  # what diverged would do so again
+        raise RunError(
+            f"after {time:.3f} s: {one_line(failure)}; {kept}{further if is_of_files else ''}"
+        ) from failure
     if stopped is not None:
-        further = f"; --resume {folder} goes on from there" if can_go_on else ""
         raise Interrupted(f"{stopped} after {time:.3f} s; {kept}{further}")
     if attempts.errors:
-        raise RunError(f"{one_line(attempts.errors[0])}; {kept}") from attempts.errors[0]
+        raise RunError(f"{one_line(attempts.errors[0])}; {kept}{further}") from attempts.errors[0]
     if stop.reason is not None:
         raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
 
@@ -165,18 +170,29 @@ def _begin(
 ) -> RunStart:
     """Write what is known before the first frame, and keep space for what comes after the last.
 
+    A run that goes on is put where it was first: what is refused leaves its folder as it is.
+
     Raises:
+        StateError: a run that goes on is made otherwise than it was.
         RunError: the system refuses, or there is no room for a run.
     """
     body, title, at_first = simulation.link.describe(), simulation.title, simulation.link.snapshot()
     if hand is not None:
         hand.take_over(simulation)
+    resumption = outputs.resumption
+    has_first_mesh = resumption is not None and outputs.path(INITIAL).exists()
+    if resumption is not None:
+        resumption.load_into(simulation)
+        if has_first_mesh:
+            outputs.keep_reserve()
+        outputs.remove_earlier_files()
     scene = _scene_to_write(scene, hand, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
     outputs.write_mesh(INITIAL, at_first)
-    outputs.keep_reserve()
+    if not has_first_mesh:
+        outputs.keep_reserve()
     # What graspers move is elsewhere when the blade comes.
     asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
     return RunStart(body, title, asked)
@@ -286,15 +302,23 @@ def _scene_to_write(scene: Scene | None, hand: LedHand | None, outputs: Outputs)
     return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
 
 
-def _warn_if_slow(simulation: Simulation) -> None:
-    """Log a warning where a frame takes so many Runge-Kutta steps that the run seems to hang."""
-    n_steps = math.ceil(simulation.dt / simulation.link.cut_report().now.time_step)
-    if n_steps > MANY_SUBSTEPS:
-        _log.warning(
-            "a frame takes %s Runge-Kutta steps, because the tissue's elements are small, stiff or "
-            "light: the run will take long. Check --scale, or lower --young, or raise --density",
-            f"{n_steps:,}",
-        )
+def _check_number_of_steps(simulation: Simulation) -> None:
+    """Refuse frames that take so many Runge-Kutta steps that nothing can end one; warn of many.
+
+    Raises:
+        UsageError: a frame takes more than `MOST_SUBSTEPS`.
+    """
+    n_steps = simulation.dt / simulation.link.cut_report().now.time_step
+    if n_steps <= MANY_SUBSTEPS:
+        return
+    found = (
+        f"a frame takes {n_steps:,.0f} Runge-Kutta steps, because the tissue's elements are small, "
+        "stiff or light"
+    )
+    remedy = "Check --scale, or lower --young, or raise --density"
+    if n_steps > MOST_SUBSTEPS:
+        raise UsageError(f"{found}; at most {MOST_SUBSTEPS:,} are done. {remedy}")
+    _log.warning("%s: the run will take long. %s", found, remedy)
 
 
 def run_time(simulation: Simulation, seconds: float | None) -> float:

@@ -4,9 +4,10 @@ Each group is a dataclass that several commands share. An option that is not giv
 leaves what the scene has.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
@@ -287,3 +288,13 @@ class TissueOptions:
     ] = ()
     """A key of the scene file, such as material.toughness=50 or stroke.0.depth=0.01. May be given
     several times. The options below override it."""
+
+
+def given_options(group: Any) -> Iterator[str]:
+    """Yield the names of the options of a group that are given, as the command line has them."""
+    for field in fields(group):
+        value = getattr(group, field.name)
+        if is_dataclass(value):
+            yield from given_options(value)
+        elif value != field.default:
+            yield "set" if field.name == "settings" else field.name.replace("_", "-")

@@ -1,9 +1,9 @@
 """Goes on with a run that was interrupted, as `run --resume FOLDER` asks for it."""
 
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
+from scalpel_sim.cli.options import given_options
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions, prepared_run
 from scalpel_sim.cli.scripted_run import perform_script
 from scalpel_sim.errors import RunError, UsageError
@@ -55,27 +55,18 @@ def _expect_no_options(options: RunOptions) -> None:
     Raises:
         UsageError: one is given; the message names it.
     """
-    given = [*_given(options.tissue), *_given(options.arm), *_given(options.client)]
+    given = [
+        name
+        for group in (options.tissue, options.arm, options.client)
+        for name in given_options(group)
+    ]
     if options.output.out is not None:
         given.append("out")
     if given:
-        name = given[0].replace("_", "-")
         raise UsageError(
-            f"--{name} is given with --resume, which goes on with what the run was asked for; omit "
-            "one of them"
+            f"--{given[0]} is given with --resume, which goes on with what the run was asked for; "
+            "omit one of them"
         )
-
-
-def _given(group: Any) -> list[str]:
-    """Return the names of the options of a group that are given."""
-    found = []
-    for field in fields(group):
-        value = getattr(group, field.name)
-        if is_dataclass(value):
-            found += _given(value)
-        elif value not in (None, False, ()):
-            found.append("set" if field.name == "settings" else field.name)
-    return found
 
 
 def _end_records(folder: Path, resumption: Resumption) -> None:

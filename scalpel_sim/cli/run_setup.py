@@ -5,7 +5,7 @@ import logging
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from scalpel_sim.cli.options import (
     OutputOptions,
     PrintOptions,
     TissueOptions,
+    given_options,
 )
 from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
 from scalpel_sim.errors import Interrupted, UsageError
@@ -161,18 +162,11 @@ def _tissue_elsewhere(
 ) -> tuple[TissueLink, Scene, dict[str, Any]]:
     """Connect to the tissue in another process, and make a scene from what its server describes."""
     tissue = options.tissue
-    if tissue.settings:
+    for option in given_options(tissue):
         raise UsageError(
-            f"--set belongs to the scene, and the tissue is at {address}; give it to "
+            f"--{option} belongs to the tissue, and that is at {address}; give it to "
             "`scalpel-sim serve`"
         )
-    for group in (tissue.body, tissue.material, tissue.blade, tissue.solver):
-        for field in fields(group):
-            if getattr(group, field.name) not in (None, False):
-                raise UsageError(
-                    f"--{field.name.replace('_', '-')} belongs to the tissue, and that is at "
-                    f"{address}; give it to `scalpel-sim serve`"
-                )
     given = scene_in_file(name) if name is not None and is_toml_file(name) else None
     link = TcpLink(address, key=chosen_key(options.client.key))
     try:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.errors import RunError, UsageError, one_line
 from scalpel_sim.output.checkpoints import Checkpoints
 from scalpel_sim.output.recording import WALL_TIMES, Recording, read_forces
 from scalpel_sim.output.run_folder import FORCES, REPLAY_FRAMES, SCENE, SUMMARY
@@ -72,18 +72,25 @@ def resumption_of(folder: Path) -> Resumption:
             f"--resume {folder}: {reason}. A run with --connect cannot be resumed; what its folder "
             "has of it, forces.csv and replay.html, stays"
         )
-    if _status_in(folder) == COMPLETE:
+    if _status_in(folder) == COMPLETE and not (folder / REPLAY_FRAMES).exists():
         raise UsageError(f"--resume {folder}: that run is complete; there is nothing to go on with")
-    try:
-        recorded = read_forces(folder / FORCES)
-    except (OSError, ValueError):  # it was killed before there was one
+    forces = folder / FORCES
+    n_forces = _whole_lines(forces) if forces.exists() else 0
+    if n_forces == 0:  # it was killed before it wrote one
         return Resumption(Recording(), 0, None)
+    try:
+        recorded = read_forces(forces)
+    except (OSError, ValueError) as error:
+        raise UsageError(
+            f"--resume {folder}: {FORCES} was changed or damaged ({one_line(error)}). Put back "
+            f"what it was, or do the run again from its {SCENE}, with another --out"
+        ) from error
     with Checkpoints(folder) as checkpoints:
         found = checkpoints.read()
     replay = folder / REPLAY_FRAMES
     n_bytes = replay.stat().st_size if replay.exists() else 0
     whole = (c for c in found if c.head.n_frames <= len(recorded) and c.head.replay <= n_bytes)
-    return Resumption(recorded, _whole_lines(folder / FORCES), next(whole, None))
+    return Resumption(recorded, n_forces, next(whole, None))
 
 
 class RepeatedFrames:
@@ -115,9 +122,9 @@ class RepeatedFrames:
             name = self._columns[differs[0]]
             raise RunError(
                 f"{self._folder / FORCES}: frame {len(recording)} is done again, and {name} is "
-                f"{now[differs[0]]!r}, not {then[differs[0]]!r} as it was: the run went on with "
-                "another version of the program or its libraries, or on another machine. Do it "
-                "again from its scene.toml"
+                f"{float(now[differs[0]])!r}, not {float(then[differs[0]])!r} as it was: the run "
+                "went on with another version of the program or its libraries, or on another "
+                f"machine, or the file was changed. Do it again from its {SCENE}"
             )
         recording.cut_back(len(recording) - 1)
         recording.append(then.tolist())

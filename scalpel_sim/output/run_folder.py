@@ -117,10 +117,8 @@ class Outputs:
         self._lock = _naming_path(folder, FolderLock)
         self._reserve: DiskReserve | None = None
         try:
-            kept = () if resumption is None else (SCENE, FORCES, *PASSING_FILES)
-            for name in (*PASSING_FILES, *RUN_FILES):
-                if name not in kept:
-                    _naming_path(folder / name, _remove)
+            if resumption is None:
+                self.remove_earlier_files()
             n_kept = 0 if resumption is None else resumption.n_bytes
             self._forces = self._growing(FORCES, columns, n_kept)
         except BaseException:
@@ -133,6 +131,17 @@ class Outputs:
         """Return where a file of this run lies."""
         return self.folder / name
 
+    def remove_earlier_files(self) -> None:
+        """Remove the files that were there; what a run goes on from stays.
+
+        Raises:
+            RunError: the system refuses.
+        """
+        kept = () if self.resumption is None else (SCENE, FORCES, *PASSING_FILES)
+        for name in (*PASSING_FILES, *RUN_FILES):
+            if name not in kept:
+                _naming_path(self.folder / name, _remove)
+
     def keep_reserve(self) -> None:
         """Keep space on the disk for the last files, once `initial.vtu` is written.
 
@@ -143,9 +152,10 @@ class Outputs:
         try:
             self._reserve = DiskReserve(self.folder, n_bytes)
         except OSError as error:
+            instead = ", or choose another --out" if self.resumption is None else ""
             raise RunError(
                 f"{self.folder}: no room for {n_bytes / 1e6:.0f} MB, which are kept for the last "
-                f"files of the run ({error.strerror or error}); make room, or choose another --out"
+                f"files of the run ({error.strerror or error}); make room{instead}"
             ) from error
 
     def free_reserve(self) -> None:

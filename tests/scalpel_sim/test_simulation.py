@@ -241,3 +241,10 @@ def test_a_mesh_from_a_file_hardly_changes_its_volume_unless_told_otherwise(tmp_
 def test_a_body_that_makes_a_run_slow_gets_a_warning(tmp_path, caplog):
     perform_in(tmp_path, prepare(changed(GRID2, young_modulus=1e10, toughness=2e7)), seconds=0.002)
     assert re.search(r"a frame takes [\d,]+ Runge-Kutta steps.*--young", caplog.text)
+
+
+def test_a_body_whose_frames_no_signal_could_end_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("scalpel_sim.run.MOST_SUBSTEPS", 300)
+    stiff = changed(GRID2, young_modulus=1e10, toughness=2e7)
+    with pytest.raises(ValueError, match=r"a frame takes [\d,]+ .*; at most 300 are done.*--young"):
+        perform_in(tmp_path, prepare(stiff), seconds=0.002)

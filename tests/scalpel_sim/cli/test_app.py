@@ -156,6 +156,10 @@ WRONG_USE = {
         ["run", "--connect", "127.0.0.1:1", "--blade-thickness", "0.001"],
         "--blade-thickness belongs to the tissue",
     ),
+    "no gravity for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--gravity", "0"],
+        "--gravity belongs to the tissue",
+    ),
     "a negative time": (["run", "slab", "--seconds", "-1"], "--seconds"),
     "an infinite time": (["run", "slab", "--seconds", "inf"], "--seconds"),
     "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),

@@ -15,7 +15,12 @@ from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import WALL_TIMES, read_forces
 from scalpel_sim.output.resumption import resumption_of
-from scalpel_sim.output.run_folder import FRAMES_PER_FLUSH, PASSING_FILES, Outputs
+from scalpel_sim.output.run_folder import (
+    FRAMES_PER_FLUSH,
+    PASSING_FILES,
+    REPLAY_FRAMES,
+    Outputs,
+)
 from scalpel_sim.run import perform
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.scenes import read_scene
@@ -165,15 +170,53 @@ def test_a_frame_that_differs_from_its_row_is_an_error_that_names_it(tmp_path):
         resume_in(tmp_path)
 
 
-def test_a_run_with_another_scene_is_refused_and_can_go_on_with_its_own(tmp_path, whole):
+def files_in(folder):
+    """Return the content of each file but the replay's frames, which are cut at a checkpoint."""
+    paths = [path for path in folder.iterdir() if path.name != REPLAY_FRAMES]
+    return {path.name: path.read_bytes() for path in paths}
+
+
+def test_a_run_with_another_scene_is_refused_and_its_folder_stays_as_it_was(tmp_path, whole):
     kill_in(tmp_path, SLAB, 333)
-    text = (tmp_path / "scene.toml").read_text()
+    (tmp_path / "final.vtu").write_text("of a run that was interrupted by a signal")
+    before = files_in(tmp_path)
     scene = changed(SLAB, material=replace(SLAB.material, young_modulus=12e3))
     with pytest.raises(StateError, match=r"material.young_modulus is .* there and 12000.0 here"):
         perform_in(tmp_path, scene, None, resumption_of(tmp_path))
-    (tmp_path / "scene.toml").write_text(text)
+    assert files_in(tmp_path) == before
     resume_in(tmp_path)
     expect_same(tmp_path, whole)
+
+
+def test_a_run_that_finds_no_room_to_go_on_leaves_its_folder_as_it_was(tmp_path, monkeypatch):
+    kill_in(tmp_path, SLAB, 333)
+    before = files_in(tmp_path)
+    monkeypatch.setattr("scalpel_sim.output.run_folder.LAST_FILES", 1 << 60)
+    with pytest.raises(RunError, match=r"no room for .*; make room$"):
+        resume_in(tmp_path)
+    assert files_in(tmp_path) == before
+
+
+def test_a_complete_run_that_lacks_a_file_makes_it_when_it_goes_on(tmp_path, monkeypatch, whole):
+    def fail(outputs):
+        raise RunError("drawing failed")
+
+    with monkeypatch.context() as failing, pytest.raises(RunError, match=r"failed.*--resume"):
+        failing.setattr(Outputs, "finish_plots", fail)
+        perform_in(tmp_path, SLAB)
+    (tmp_path / "force.png").unlink(missing_ok=True)
+    resume_in(tmp_path)
+    assert (tmp_path / "force.png").exists()
+    expect_same(tmp_path, whole)
+    assert not {path.name for path in tmp_path.iterdir()} & set(PASSING_FILES)
+
+
+def test_a_table_that_was_damaged_is_refused_by_its_row(tmp_path):
+    kill_in(tmp_path, SLAB, 333)
+    forces = tmp_path / "forces.csv"
+    forces.write_text(forces.read_text().replace("\n", "\nword,", 40))
+    with pytest.raises(UsageError, match=r"forces.csv was changed or damaged \(.*'word'"):
+        resumption_of(tmp_path)
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
