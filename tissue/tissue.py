@@ -224,11 +224,11 @@ class Tissue(RepeatedSteps):
 
         Dynamic relaxation (`tissue.integrators.equilibrium`): all nodes are moved together,
         whatever the integrator. Stress that relaxes (`Material.prony`) has relaxed wholly: this is
-        where the body comes to rest at last. A body that has not come to rest gets a warning.
+        where the body comes to rest at last. A body that still moves a little gets a warning.
 
         Raises:
             TissueError: nothing holds the body, or a piece of it, against its weight and its loads,
-                or its motion became unstable. It is then where it was.
+                its motion became unstable, or it does not come to rest. It is then where it was.
         """
         self._begin_change()
         self._with_room(lambda: self._take_edge(None))

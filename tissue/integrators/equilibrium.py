@@ -14,17 +14,21 @@ from tissue.blade.edge import Edge
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.strained_frequency import StepLimit
+from tissue.integrators.equilibrium_checks import fastest_node
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
-from tissue.integrators.unstable import not_finite
+from tissue.integrators.unstable import UnstableError, not_finite
 from tissue.types import TissueError
 
 SETTLED = 1e-4 * 9.81
 """Acceleration at which the body counts as settled [m/s2]. Cubes, bars and the organ are then
 within 0.05 % of their sag from rest; at ten times as much within 0.5 %, after 2/3 of the steps."""
+RESTLESS = 9.81
+"""Acceleration above which a body that has not settled is refused [m/s2]: what pulls so hard as its
+weight, after all these steps, is no slow rest of its motion."""
 ROUNDING = 10.0 * 2.0**-24
 """Part of a displacement that single precision makes of it, up to the force on a node. Measured 7
 times 2^-24 in the organ, where accelerations fall to 0.01 to 0.03 m/s2 and no further."""
@@ -80,8 +84,8 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
         edge: The edge of no blade.
 
     Raises:
-        TissueError: a part of the body is held by nothing, or the motion became unstable. All nodes
-            are then where they were, and stopped.
+        TissueError: a part of the body is held by nothing, the motion became unstable, or it is
+            faster than `RESTLESS` in the end. All nodes are then where they were, and stopped.
     """
     body, n = system.body, system.body.n_nodes
     velocities, begin = body.velocities[:n], body.positions[:n].copy()
@@ -93,9 +97,14 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
     try:
         with system.without_drag():
             return _relax(stepper, system, edge)
-    except TissueError:
+    except TissueError as error:
         body.positions[:n] = begin
         velocities[:] = 0.0
+        if isinstance(error, UnstableError):
+            raise TissueError(
+                f"the body cannot come to rest: {error.fault}. Less gravity, load or stretch, or a "
+                "stiffer material, may help"
+            ) from error
         raise
 
 
@@ -116,6 +125,9 @@ def _relax(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
             return Settling(done + STEPS_BETWEEN_LOOKS, True, before)
         if done == 0:
             _disturb(system)
+    fastest = fastest_node(system, before)
+    if fastest.acceleration > RESTLESS:
+        raise TissueError(f"the body cannot come to rest: {fastest.described(LONGEST_SETTLING)}")
     return Settling(LONGEST_SETTLING, False, before)
 
 

@@ -1,6 +1,7 @@
 """Whether a body can come to rest, and what to say where it did not."""
 
 import logging
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,8 +43,41 @@ def expect_support(system: System, floor: float | None) -> None:
     )
 
 
+class FastestNode(NamedTuple):
+    """The node of a body that is accelerated most."""
+
+    node: int
+    """Its number."""
+    position: FloatArray
+    """Where it is [m], shape (3,)."""
+    acceleration: float
+    """The largest part of its acceleration [m/s2]."""
+
+    def described(self, n_steps: int) -> str:
+        """Return what it does after so many steps, and what helps."""
+        x, y, z = self.position
+        return (
+            f"after {n_steps:,} steps node {self.node}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, is still "
+            f"accelerated by {self.acceleration:.2g} m/s2. What helps: a mesh without small or "
+            "flat tetrahedra, whose steps are short; a softer material; a lower Poisson's ratio; "
+            "less gravity, load or stretch where the body buckles"
+        )
+
+
+def fastest_node(system: System, accelerations: FloatArray) -> FastestNode:
+    """Return the node of a body that is accelerated most.
+
+    Args:
+        system: The body.
+        accelerations: Accelerations of its nodes [m/s2], shape (n_nodes, 3).
+    """
+    sizes = np.abs(accelerations).max(axis=1)
+    node = int(sizes.argmax())
+    return FastestNode(node, system.body.positions[node], float(sizes[node]))
+
+
 def warn_of_motion(system: System, n_steps: int, accelerations: FloatArray, settled: float) -> None:
-    """Log a warning that a body did not come to rest.
+    """Log a warning that a body has not come to rest yet.
 
     Args:
         system: The body.
@@ -51,19 +85,9 @@ def warn_of_motion(system: System, n_steps: int, accelerations: FloatArray, sett
         accelerations: Accelerations of its nodes [m/s2], shape (n_nodes, 3).
         settled: Acceleration at which it counts as settled [m/s2].
     """
-    sizes = np.abs(accelerations).max(axis=1)
-    node = int(sizes.argmax())
-    x, y, z = system.body.positions[node]
     _log.warning(
-        "the body has not come to rest in %s steps: node %d, at (%.3g, %.3g, %.3g) m, is still "
-        "accelerated by %.2g m/s2, and less than %.2g counts as rest. It moves on from there. "
-        "What helps: settling once more; a mesh without small or flat tetrahedra, whose steps are "
-        "short; a lower Poisson's ratio; less gravity, load or stretch where the body buckles",
-        f"{n_steps:,}",
-        node,
-        x,
-        y,
-        z,
-        sizes[node],
+        "the body has not come to rest, and moves on from here: %s; settling once more. Less than "
+        "%.2g m/s2 counts as rest",
+        fastest_node(system, accelerations).described(n_steps),
         settled,
     )

@@ -145,12 +145,27 @@ def test_a_body_of_which_every_node_is_fixed_is_settled():
     assert (tissue.snapshot().velocities == 0.0).all()
 
 
-def test_a_body_that_does_not_come_to_rest_gets_a_warning_that_says_where(monkeypatch, caplog):
+def test_a_body_that_gives_way_is_refused_with_what_may_help():
+    soft = Material(law="neo_hookean", young_modulus=1.0)
+    tissue = Tissue(BAR, soft, fixed=fixed_nodes(BAR, "left"), gravity=(0.0, 0.0, -1e3))
+    with pytest.raises(TissueError, match=r"cannot come to rest: .*stiffer material"):
+        tissue.settle()
+
+
+def test_a_body_that_is_as_fast_as_at_first_is_refused_and_stays_where_it_was(monkeypatch):
     monkeypatch.setattr(equilibrium, "LONGEST_SETTLING", 40)
+    taut = Tissue(BAR, Material(), fixed=fixed_nodes(BAR, "left"), positions=1.1 * BAR.positions)
+    with pytest.raises(TissueError, match=r"cannot come to rest: after 40 steps node \d+, at"):
+        taut.settle()
+    np.testing.assert_array_equal(taut.snapshot().positions, 1.1 * BAR.positions)
+
+
+def test_a_body_that_does_not_come_to_rest_gets_a_warning_that_says_where(monkeypatch, caplog):
+    monkeypatch.setattr(equilibrium, "LONGEST_SETTLING", 80)
     tissue = Tissue(BAR, Material(), fixed=fixed_nodes(BAR, "left"))
-    assert tissue.settle() == 40
+    assert tissue.settle() == 80
     found = re.search(
-        r"not come to rest in 40 steps: node (\d+), at .* by ([\d.]+) m/s2", caplog.text
+        r"not come to rest.* 80 steps node (\d+), at .* by ([\d.]+) m/s2", caplog.text
     )
     assert found is not None
     assert int(found[1]) < len(BAR.positions)
