@@ -15,7 +15,7 @@ from tests.scalpel_sim.hands.led_view import LedView
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
 
-STEPS_OF_DRAG = 30
+STEPS_OF_DRAG = 15
 """Moves of the mouse in a drag."""
 
 PAUSE = 0.03
