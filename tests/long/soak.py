@@ -56,6 +56,9 @@ CLEAR = 0.02
 EDGE = 0.075
 """Length of the edge of the arm's blade in this scene, about [m]."""
 
+ASIDE = 5e-3
+"""How far a hand draws back and goes aside in a stroke, at most [m]."""
+
 PAUSE_EVERY, PAUSE = 4000, 500
 """Frames after which a hand pauses, and of a pause."""
 
@@ -164,6 +167,8 @@ def led(random: np.random.Generator, life: float, viewer: Viewer) -> Life:
 def way_of_stroke(random: np.random.Generator, bounds: FloatArray) -> list[FloatArray]:
     """Return where a hand leads the middle of the edge in a stroke [m]: down, through, up, back.
 
+    On its way through it draws back once, and goes on beside where it was.
+
     Args:
         random: Where the stroke is.
         bounds: Lowest and highest corner of the body [m], shape (2, 3).
@@ -172,9 +177,18 @@ def way_of_stroke(random: np.random.Generator, bounds: FloatArray) -> list[Float
     x, depth = random.uniform(low[0], high[0]), random.uniform(0.3, 1.0) * (high[2] - low[2])
     above, within = high[2] + CLEAR, high[2] + 0.5 * EDGE - depth
     front, back = low[1] - CLEAR, high[1] + CLEAR
+    turn, retreat, aside = random.uniform(low[1], high[1]), *random.uniform(0.0, ASIDE, 2)
+    beside = x + random.choice([-1.0, 1.0]) * aside
     return [
         np.array(p)
-        for p in ((x, front, above), (x, front, within), (x, back, within), (x, back, above))
+        for p in (
+            (x, front, above),
+            (x, front, within),
+            (x, turn, within),
+            (beside, turn - retreat, within),
+            (beside, back, within),
+            (beside, back, above),
+        )
     ]
 
 
