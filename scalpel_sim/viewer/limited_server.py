@@ -4,7 +4,6 @@ from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.iostream import IOStream
-from tornado.web import Application
 
 MOST_CONNECTIONS = 64
 """Open connections at most. A browser opens up to six to a server."""
@@ -23,18 +22,15 @@ LARGEST_BODY = 1 << 10
 class LimitedServer(HTTPServer):
     """Serves an application; connections beyond `MOST_CONNECTIONS` are closed at once."""
 
-    def __init__(self, application: Application) -> None:
-        super().__init__(
-            application,
-            idle_connection_timeout=IDLE_SECONDS_OF_HTTP,
-            body_timeout=IDLE_SECONDS_OF_HTTP,
-            max_header_size=LARGEST_HEAD,
-            max_body_size=LARGEST_BODY,
-        )
-
     def initialize(self, *args: Any, **options: Any) -> None:
-        """Set the options; called by tornado."""
-        super().initialize(*args, **options)
+        """Set the limits; called by tornado, whose constructor takes no notice of options."""
+        limits = {
+            "idle_connection_timeout": IDLE_SECONDS_OF_HTTP,
+            "body_timeout": IDLE_SECONDS_OF_HTTP,
+            "max_header_size": LARGEST_HEAD,
+            "max_body_size": LARGEST_BODY,
+        }
+        super().initialize(*args, **(options | limits))
         self._streams: list[IOStream] = []
 
     def handle_stream(self, stream: IOStream, address: tuple[Any, ...]) -> None:

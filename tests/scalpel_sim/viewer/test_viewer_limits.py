@@ -8,7 +8,7 @@ import pytest
 
 from scalpel_sim import Viewer
 from scalpel_sim.viewer import viewer as viewer_module
-from scalpel_sim.viewer.limited_server import MOST_CONNECTIONS
+from scalpel_sim.viewer.limited_server import LARGEST_BODY, LARGEST_HEAD, MOST_CONNECTIONS
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
@@ -62,6 +62,27 @@ def is_closed(connection):
         return False
 
 
+@pytest.fixture
+def impatient(monkeypatch):
+    """A browser of a page whose server waits for half a second."""
+    module = "scalpel_sim.viewer.limited_server"
+    sooner = f"import {module} as server; server.IDLE_SECONDS_OF_HTTP = 0.5; "
+    monkeypatch.setattr(viewer_module, "_PROGRAM", sooner + viewer_module._PROGRAM)
+    with Viewer(little_arm()[0], frame=FRAME) as viewer:
+        browser = FaultyBrowser(viewer, lambda n: None, np.random.default_rng(0))
+        yield browser
+        browser.close()
+
+
+def ask(browser, method="GET", **headers):
+    """Return the connection on which a request was sent, of a body that is still to come."""
+    lines = [f"{name.replace('_', '-')}: {value}" for name, value in headers.items()]
+    connection = browser._connected()
+    head = "\r\n".join([f"{method} / HTTP/1.1", f"Host: {browser._host}", *lines, "\r\n"])
+    connection.sendall(head.encode())
+    return connection
+
+
 class ClosedPage:
     """A page that was closed, which is noticed when it is sent something."""
 
@@ -90,6 +111,34 @@ def test_connections_beyond_the_limit_are_closed_and_free_their_places(viewer, o
         each.close()
     time.sleep(0.5)
     assert b"101 Switching Protocols" in received(opened.open_page())
+
+
+def test_connections_on_which_nothing_comes_are_closed_and_free_their_places(impatient):
+    silent = [impatient._connected() for _ in range(MOST_CONNECTIONS)]
+    assert received(silent[-1]) == b"" and is_closed(silent[-1])
+    assert b"101 Switching Protocols" in received(impatient.open_page())
+
+
+def test_a_page_that_says_nothing_is_no_idle_connection(impatient):
+    page = impatient.open_page()
+    assert b"101 Switching Protocols" in received(page)
+    assert not is_closed(page)
+
+
+def test_a_request_whose_body_does_not_come_is_closed(impatient):
+    page = ask(impatient, "POST", Content_Length=LARGEST_BODY)
+    assert received(page) == b"" and is_closed(page)
+
+
+def test_a_head_beyond_the_limit_is_not_answered(viewer, opened):
+    assert b"200 OK" in received(ask(opened, Cookie="a" * (LARGEST_HEAD // 2)))
+    assert b"HTTP" not in received(ask(opened, Cookie="a" * 2 * LARGEST_HEAD))
+    assert b"200 OK" in received(ask(opened))
+
+
+def test_a_body_beyond_the_limit_is_refused_before_it_comes(viewer, opened):
+    assert received(ask(opened, "POST", Content_Length=LARGEST_BODY)) == b""
+    assert b"400 Bad Request" in received(ask(opened, "POST", Content_Length=LARGEST_BODY + 1))
 
 
 def test_pages_beyond_the_limit_are_closed_and_free_their_places(viewer, opened):
