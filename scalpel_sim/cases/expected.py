@@ -1,6 +1,7 @@
 """Compares the records of a case with the curves and values that it expects."""
 
 import csv
+import io
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -11,8 +12,12 @@ from scalpel_sim.cases.case_file import TIME, CaseFile
 from scalpel_sim.cases.recording import CaseRecord
 from scalpel_sim.cases.tables import ExpectedTable
 from scalpel_sim.errors import UsageError
+from scalpel_sim.tables.text_file import read_text_file
 from scalpel_sim.validate.findings import CASE, Check
 from tissue import BoolArray, FloatArray
+
+LARGEST_CURVE = 1 << 24
+"""Largest file of a curve [byte]: half a million rows."""
 
 
 class ExpectedCurve(NamedTuple):
@@ -31,9 +36,9 @@ def read_curve(path: Path) -> ExpectedCurve:
         UsageError: the file cannot be read, a row is not two finite numbers, or x does not ascend.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        file = io.StringIO(read_text_file(path, LARGEST_CURVE))
+        lines = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
+    except (UsageError, csv.Error) as error:
         raise UsageError(f"{path} cannot be read as CSV: {error}") from error
     rows = []
     for number, row in lines[1:]:

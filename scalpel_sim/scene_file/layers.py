@@ -112,5 +112,5 @@ def _value(text: str) -> Any:
     """Return a value as a file has it, or the text itself."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return text.strip()

@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scalpel_sim.errors import UsageError
+from scalpel_sim.tables.text_file import read_text_file
+
+LARGEST_MOTION = 1 << 29
+"""Largest file of a motion [byte]: about an hour of a hand with a row each millisecond."""
 
 
 class StrokeError(UsageError):
@@ -23,13 +27,12 @@ def numbered_lines(path: Path, what: str, columns: Sequence[str]) -> list[tuple[
         columns: Columns that it must have, for messages.
 
     Raises:
-        StrokeError: no such file, no text, or nothing in it.
+        StrokeError: no such file, no text, more than `LARGEST_MOTION`, or nothing in it.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise StrokeError(f"cannot read the {what} {path}: {reason}") from error
+        lines = read_text_file(path, LARGEST_MOTION).splitlines()
+    except UsageError as error:
+        raise StrokeError(f"cannot read the {what} {path}: {error}") from error
     numbered = [
         (number, [cell.strip() for cell in next(csv.reader([line]))])
         for number, line in enumerate(lines, start=1)

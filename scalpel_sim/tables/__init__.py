@@ -6,4 +6,5 @@ body      [body]: the geometry
 view      [[view]]: where a scene is looked at from
 problems  says what is wrong with a value, and where
 toml      reads a file
+text_file a file as text, no larger than is allowed
 """

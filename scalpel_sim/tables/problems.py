@@ -87,7 +87,10 @@ def as_toml(value: object) -> str:
     """Return a value as it stands in the file, cut short if it is long."""
     if isinstance(value, bool):
         return str(value).lower()
-    text = f'"{value}"' if isinstance(value, str) else str(value)
+    try:
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+    except (ValueError, RecursionError):  # thousands of digits, or of tables in each other
+        return "too long to be shown"
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

@@ -8,9 +8,13 @@ import msgspec
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.tables.problems import problem_of
+from scalpel_sim.tables.text_file import read_text_file
 
 SUFFIX = ".toml"
 """What the names of such files end in."""
+
+LARGEST_FILE = 1 << 22
+"""Largest file [byte]: those that people write have some thousand."""
 
 Content = TypeVar("Content", bound=msgspec.Struct)
 
@@ -28,18 +32,24 @@ def read_toml(path: Path, how_to_begin: str) -> dict[str, Any]:
         how_to_begin: Where one to start from comes from, for messages.
 
     Raises:
-        UsageError: the file cannot be read, or is no TOML.
+        UsageError: the file cannot be read, has more than `LARGEST_FILE`, or is no TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UsageError(
-            f"{path} cannot be read: {error.strerror or error}; {how_to_begin}"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{path} is not a text file; {how_to_begin}") from error
+        text = read_text_file(path, LARGEST_FILE)
+    except UsageError as error:
+        raise UsageError(f"{path} cannot be read: {error}; {how_to_begin}") from error
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is not valid TOML: {error}; {how_to_begin}") from error
+    except ValueError as error:
+        raise UsageError(
+            f"{path} cannot be read: an integer in it has thousands of digits; {how_to_begin}"
+        ) from error
+    except RecursionError as error:
+        raise UsageError(
+            f"{path} cannot be read: its brackets are nested too deep; {how_to_begin}"
+        ) from error
 
 
 def as_tables(content: dict[str, Any], table: type[Content]) -> Content:

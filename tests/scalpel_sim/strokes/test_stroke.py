@@ -138,7 +138,7 @@ def test_a_bad_file_is_refused_with_the_line(tmp_path, lines, message):
 def test_a_file_that_cannot_be_read_is_refused_by_name(tmp_path):
     with pytest.raises(StrokeError, match=r"none.csv: No such file"):
         from_csv(tmp_path / "none.csv")
-    with pytest.raises(StrokeError, match="Is a directory"):
+    with pytest.raises(StrokeError, match="it is a folder"):
         from_csv(tmp_path)
     (tmp_path / "image.csv").write_bytes(bytes(range(128, 256)))
     with pytest.raises(StrokeError, match="not a text file"):
