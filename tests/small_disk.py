@@ -23,6 +23,28 @@ def small_disks_are_allowed() -> bool:
     return done.returncode == 0
 
 
+def run_on_a_full_disk(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run `scalpel-sim` on a full disk, which holds a folder's files at /mnt, and copy them back.
+
+    Args:
+        words: What follows `scalpel-sim`.
+        folder: The folder.
+    """
+    script = f"""
+        mount -t tmpfs -o size=1M none /mnt || exit 99
+        cp -a {shlex.quote(str(folder))}/. /mnt
+        dd if=/dev/zero of=/mnt/filler bs=4k 2>/dev/null
+        {shlex.join([sys.executable, "-m", "scalpel_sim", *words])}
+        code=$?
+        rm /mnt/filler
+        cp -a /mnt/. {shlex.quote(str(folder))}
+        exit $code
+    """
+    return subprocess.run(
+        [*NAMESPACE, script], capture_output=True, text=True, env=environment(), timeout=300
+    )
+
+
 def run_on_a_small_disk(
     *words: str, megabytes: float, copy_to: Path, filled_after: float | None = None
 ) -> subprocess.CompletedProcess[str]:

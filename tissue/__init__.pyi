@@ -32,6 +32,7 @@ from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .io.whole_file import new_whole_file as new_whole_file
 from .io.whole_file import remove_unfinished as remove_unfinished
 from .io.whole_file import whole_file as whole_file
 from .loads.attachment import Attachment as Attachment
@@ -138,6 +139,7 @@ __all__ = [
     "lattice_block",
     "liver_lobe",
     "n_compiled_kernels",
+    "new_whole_file",
     "pieces_of",
     "read_mesh",
     "remove_unfinished",

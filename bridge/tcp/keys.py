@@ -6,6 +6,8 @@ import secrets
 import stat
 from pathlib import Path
 
+from tissue import new_whole_file
+
 KEY_VARIABLE = "SCALPEL_SIM_KEY"
 """Environment variable that holds a key, if no file is given."""
 NEW_KEY_BYTES = 32
@@ -58,14 +60,21 @@ def write_new_key(path: Path) -> None:
 
     Raises:
         ValueError: the file exists.
-        OSError: the file cannot be written.
+        OSError: the file cannot be written; the message names it.
     """
     try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with new_whole_file(path) as unfinished:
+            descriptor = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(descriptor, "w", encoding="ascii") as file:
+                file.write(secrets.token_hex(NEW_KEY_BYTES) + "\n")
     except FileExistsError as cause:
-        raise ValueError(f"{path} exists already, and a key is never overwritten") from cause
-    with os.fdopen(descriptor, "w", encoding="ascii") as file:
-        file.write(secrets.token_hex(NEW_KEY_BYTES) + "\n")
+        raise ValueError(
+            f"{path} exists already, and a key is never overwritten; choose another file"
+        ) from cause
+    except OSError as cause:
+        raise OSError(
+            f"the key file {path} cannot be written: {cause.strerror or cause}; choose another file"
+        ) from cause
 
 
 def _key_in(text: str, where: str) -> bytes:

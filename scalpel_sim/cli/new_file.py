@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from scalpel_sim.errors import RunError, UsageError
+from tissue import new_whole_file, whole_file
 
 
 def write_new_file(path: Path, text: str, *, force: bool, instead: str) -> None:
-    """Write a text to a file that does not exist yet.
+    """Write a text to a file that does not exist yet; an error leaves what was there.
 
     Args:
         path: The file.
@@ -18,9 +19,10 @@ def write_new_file(path: Path, text: str, *, force: bool, instead: str) -> None:
         UsageError: the file exists, and `force` is not given.
         RunError: the system refuses.
     """
+    placed = whole_file if force else new_whole_file
     try:
-        with path.open("w" if force else "x", encoding="utf-8") as file:
-            file.write(text)
+        with placed(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
     except FileExistsError as error:
         raise UsageError(
             f"{path} exists already; choose another file, or add --force to replace it"

@@ -1,7 +1,8 @@
 """The paper's figures as PNG files: the cuts are done, drawn at some moments, and laid out."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.texture_mapping import map_texture
-from tissue import FloatArray
+from tissue import FloatArray, whole_file
 
 WHITE = (1.0, 1.0, 1.0)
 """Colour of table and background (sRGB)."""
@@ -61,6 +62,22 @@ class Drawn(NamedTuple):
     """Label of each panel."""
     n_tetrahedra: list[int]
     """Number of tetrahedra in each panel."""
+
+
+@contextmanager
+def figure_file(path: Path) -> Iterator[Path]:
+    """Yield a name beside `path` to write a figure at, which then replaces the one at `path`.
+
+    Raises:
+        RunError: the file could not be written.
+    """
+    try:
+        with whole_file(path) as unfinished:
+            yield unfinished
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
+        ) from error
 
 
 def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
@@ -173,9 +190,5 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
         fontsize=8.5,
         style="italic",
     )
-    try:
-        FigureCanvasAgg(figure).print_figure(path, dpi=_DOTS_PER_INCH, format="png")
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
-        ) from error
+    with figure_file(path) as unfinished:
+        FigureCanvasAgg(figure).print_figure(unfinished, dpi=_DOTS_PER_INCH, format="png")

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from scalpel_sim.errors import RunError
 from scalpel_sim.figures.cuts import moments, with_scheme
-from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, picture, view_of
+from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, figure_file, picture, view_of
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.strokes.cuts import PlannedCut
 
@@ -42,12 +41,8 @@ def draw_organ(path: Path, scheme: str = "stellar") -> Drawn:
     gap = np.ones((view.height, GAP, 3))
     shades = np.clip(np.concatenate([panels[0], gap, panels[1]], axis=1), 0.0, 1.0)
     image = Image.fromarray((255.0 * shades).astype(np.uint8)).quantize(_COLOURS)
-    try:
-        image.save(path, format="PNG", optimize=True)
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
-        ) from error
+    with figure_file(path) as unfinished:
+        image.save(unfinished, format="PNG", optimize=True)
     counts = [len(moment.snapshot.tetrahedra) for moment in seen]
     labels = [f"{share:.0%} of the stroke" for share in _MOMENTS]
     return Drawn("the arm draws a scalpel through an organ", labels, counts)

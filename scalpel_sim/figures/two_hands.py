@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from scalpel_sim.errors import RunError
 from scalpel_sim.figures.cuts import Moment, tool_of
-from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, picture, view_of
+from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, figure_file, picture, view_of
 from scalpel_sim.preparation import prepare
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
@@ -34,12 +33,9 @@ def draw_two_hands(name: str, path: Path) -> Drawn:
     panels = [picture(view, moment, with_tool=True) for moment in seen]
     gap = np.ones((view.height, GAP, 3))
     shades = np.clip(np.concatenate([panels[0], gap, panels[1]], axis=1), 0.0, 1.0)
-    try:
-        Image.fromarray((255.0 * shades).astype(np.uint8)).save(path, format="PNG", optimize=True)
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
-        ) from error
+    image = Image.fromarray((255.0 * shades).astype(np.uint8))
+    with figure_file(path) as unfinished:
+        image.save(unfinished, format="PNG", optimize=True)
     labels = [f"after {seconds:g} s" for seconds in TWO_HANDS[name]]
     return Drawn(scene.about, labels, [len(moment.snapshot.tetrahedra) for moment in seen])
 

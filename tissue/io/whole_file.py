@@ -30,6 +30,27 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         unfinished.unlink(missing_ok=True)
 
 
+@contextmanager
+def new_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a name beside `path` to write a file at, which then appears at `path`.
+
+    From the first moment there is an empty file at `path`, so that no other process can take the
+    name. An error leaves none.
+
+    Raises:
+        FileExistsError: There is a file at `path`; it stays as it is.
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
+    try:
+        with whole_file(target) as unfinished:
+            yield unfinished
+    except BaseException:
+        target.unlink()
+        raise
+
+
 def remove_unfinished(path: str | os.PathLike[str]) -> None:
     """Remove what processes that were killed have left beside `path`.
 
