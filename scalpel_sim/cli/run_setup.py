@@ -2,7 +2,6 @@
 
 import gc
 import logging
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -27,7 +26,7 @@ from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
 from scalpel_sim.scene_body import check_scene, make_tissue
-from scalpel_sim.scene_parts.scene import Scene, changed
+from scalpel_sim.scene_parts.scene import LONGEST_RUN, Scene, changed
 from scalpel_sim.scenes import scene_of
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import loading
@@ -250,13 +249,16 @@ def _checkpoint_seconds(options: RunOptions) -> float:
     """Return the simulated time between two checkpoints [s]; 0: there are none.
 
     Raises:
-        UsageError: it is no time, or the tissue is elsewhere.
+        UsageError: it is no time, or longer than any run, or the tissue is elsewhere.
     """
     asked, is_here = options.output.checkpoint, options.client.connect is None
     if asked is None:
         return CHECKPOINT_SECONDS if is_here else 0.0
-    if not (math.isfinite(asked) and asked >= 0.0):
-        raise UsageError(f"--checkpoint is {asked}; it must be a time [s], or 0 for none")
+    if not 0.0 <= asked <= LONGEST_RUN:
+        raise UsageError(
+            f"--checkpoint is {asked}; it must be a time of at most {LONGEST_RUN:g} s, or 0 for "
+            "none"
+        )
     if asked > 0.0 and not is_here:
         raise UsageError(
             "--checkpoint is for a tissue in this process, and --connect has it elsewhere; omit "

@@ -21,6 +21,7 @@ from scalpel_sim.errors import EXIT_WRONG_USE
         ("--resume out/a", "there is no such folder"),
         ("slab --checkpoint -1", "--checkpoint is -1.0; it must be a time"),
         ("slab --checkpoint nan", "--checkpoint is nan; it must be a time"),
+        ("slab --checkpoint 1e308", "it must be a time of at most 3600 s"),
         ("--checkpoint 1 --connect 127.0.0.1:1", "--connect has it elsewhere; omit one of them"),
     ],
 )
