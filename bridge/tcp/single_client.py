@@ -70,6 +70,7 @@ class SingleClientServer(abc.ABC):
         self._selector.register(self._listener, selectors.EVENT_READ)
         self._peers: list[Peer] = []
         self._client: Peer | None = None
+        self._failure = ""
 
     @abc.abstractmethod
     def _reply(self, frame: Frame) -> bytes:
@@ -224,8 +225,8 @@ class SingleClientServer(abc.ABC):
             self._note_refusal(peer, error)
             self._send(peer, MessageKind.ERROR, pack_error(str(error)), frame.sequence)
         except Exception as error:  # a failure is reported and does not end the server
-            _logger.exception("%s of %s failed", self._served, peer.name)
             text = f"{type(error).__name__}: {error}"
+            self._note_failure(peer, text)
             self._send(peer, MessageKind.ERROR, pack_error(text), frame.sequence)
         else:
             self._send(peer, MessageKind(frame.kind), reply, frame.sequence)
@@ -234,6 +235,12 @@ class SingleClientServer(abc.ABC):
     def _note_refusal(self, peer: Peer, error: MessageError) -> None:
         """Log that a request of the client is refused."""
         _logger.warning("refused a request of %s: %s", peer.name, error)
+
+    def _note_failure(self, peer: Peer, reason: str) -> None:
+        """Log why a request of the client failed; once if the next ones fail of the same."""
+        if reason != self._failure:
+            _logger.exception("%s of %s failed: %s", self._served, peer.name, reason)
+        self._failure = reason
 
     def _send(
         self, peer: Peer, kind: MessageKind, payload: bytes, sequence: int | None = None
@@ -260,7 +267,7 @@ class SingleClientServer(abc.ABC):
         self._selector.unregister(peer.socket)
         peer.close(final_frame)
         if peer is self._client:
-            self._client = None
+            self._client, self._failure = None, ""
             self._forget_client()
 
 
