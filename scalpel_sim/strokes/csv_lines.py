@@ -27,20 +27,29 @@ def numbered_lines(path: Path, what: str, columns: Sequence[str]) -> list[tuple[
         columns: Columns that it must have, for messages.
 
     Raises:
-        StrokeError: no such file, no text, more than `LARGEST_MOTION`, or nothing in it.
+        StrokeError: no such file, no text, more than `LARGEST_MOTION`, nothing in it, or a line
+            that is no CSV.
     """
     try:
         lines = read_text_file(path, LARGEST_MOTION).splitlines()
     except UsageError as error:
         raise StrokeError(f"cannot read the {what} {path}: {error}") from error
     numbered = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        (number, _cells(path, number, line))
         for number, line in enumerate(lines, start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not numbered:
         raise StrokeError(f"{path} is empty; its first line is {','.join(columns)}")
     return numbered
+
+
+def _cells(path: Path, number: int, line: str) -> list[str]:
+    """Return the cells of a line."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line]))]
+    except csv.Error as error:
+        raise StrokeError(f"{path}, line {number}: it cannot be read as CSV: {error}") from error
 
 
 def numbers_of(path: Path, number: int, cells: list[str], columns: list[int]) -> list[float]:

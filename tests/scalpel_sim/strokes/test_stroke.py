@@ -126,6 +126,7 @@ GOOD = "0,0,0,0,0,0,.05"
         ([HEADER, "0,0,0,0,0,0,0", "1,0,.01,0,0,.01,0"], "line 2: .* no length"),
         ([HEADER, GOOD, "1,0,.01,0,0,.01,.06"], "line 3: .* does not stretch"),
         ([HEADER, GOOD, "1,0,10,0,0,10,.05"], "line 3: .* in metres"),
+        ([HEADER, GOOD, "1" * 200_000], "line 3: it cannot be read as CSV: field larger"),
         ([HEADER, GOOD, "1,0,0,-.01,0,0,.04"], "never moves across its edge"),
     ],
 )
