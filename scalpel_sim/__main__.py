@@ -6,6 +6,7 @@ import os
 import sys
 from typing import NoReturn
 
+from scalpel_sim.errors import EXIT_RUN_FAILED
 from scalpel_sim.stop_signals import ignore_signals, interrupt_on_signals, raised_signal
 
 
@@ -23,7 +24,11 @@ def main() -> None:
     gc.disable()
     from scalpel_sim.cli.app import command_line
 
-    code = command_line(sys.argv[1:])
+    try:
+        code = command_line(sys.argv[1:])
+    except KeyboardInterrupt as error:  # one more signal, while the first was told
+        print(f"error: {error}", file=sys.stderr)
+        code = EXIT_RUN_FAILED
     ignore_signals()  # all is done, and a signal would change the code
     if raised_signal() is not None:
         _end_at_once(code)

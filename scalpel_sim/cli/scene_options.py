@@ -23,7 +23,7 @@ from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.layers import merged, with_environment, with_settings
 from scalpel_sim.scene_file.reading import SceneFile, read_scene_file, shipped_scene
 from scalpel_sim.scene_parts.choices import can_audit
-from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scene_parts.scene import GEL, Scene
 from scalpel_sim.scenes import DEFAULT_SCENE
 from scalpel_sim.tables.material import given_in
 from scalpel_sim.tables.stroke import stroke_called
@@ -131,7 +131,10 @@ def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> 
             f"--scale is {scale}; it must be positive: the metres in one unit of {mesh}"
         )
     body = {"shape": "mesh", "file": str(mesh)} | ({} if scale is None else {"scale": scale})
-    return SceneFile({"about": f"the mesh {mesh.name}", "body": body}, mesh.stem, Path())
+    # The gel that a scene without a material has, for options to change.
+    material = {key: getattr(GEL, key) for key in ("law", "young_modulus", "blade_friction")}
+    content = {"about": f"the mesh {mesh.name}", "body": body, "material": material}
+    return SceneFile(content, mesh.stem, Path())
 
 
 def _warn_of_unused_tables(material: MaterialOptions, blade: BladeOptions) -> None:

@@ -1,12 +1,13 @@
 import gc
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bridge import InProcessLink, LinkError
 from scalpel_sim import SCENES, Simulation, prepare
-from scalpel_sim.cli.options import BodyOptions, TissueOptions
+from scalpel_sim.cli.options import BodyOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
@@ -14,7 +15,7 @@ from scalpel_sim.output.recording import COLUMNS, read_forces
 from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES, SCENE, Outputs
 from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene_parts.scene import GEL, changed
 from scalpel_sim.scenes import DEFAULT_SCENE, scene_called, scene_of
 from tests.run_files import names_in
 from tissue import Tissue, block, write_vtu
@@ -236,6 +237,15 @@ def test_a_mesh_from_a_file_hardly_changes_its_volume_unless_told_otherwise(tmp_
     scene = chosen_scene(None, TissueOptions(body=BodyOptions(mesh=path)))
     assert (scene.material.law, scene.material.poisson_ratio) == ("neo_hookean", 0.45)
     assert changed(scene, law="springs").material.law == "springs"
+
+
+def test_options_change_the_gel_of_a_mesh_from_a_file(tmp_path):
+    path = tmp_path / "body.vtu"
+    write_vtu(path, make_tissue(GRID2).snapshot())
+    body, tougher = BodyOptions(mesh=path), MaterialOptions(toughness=60.0)
+    assert chosen_scene(None, TissueOptions(body=body)).material == GEL
+    scene = chosen_scene(None, TissueOptions(body=body, material=tougher))
+    assert scene.material == replace(GEL, toughness=60.0)
 
 
 def test_a_body_that_makes_a_run_slow_gets_a_warning(tmp_path, caplog):

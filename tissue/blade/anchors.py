@@ -70,9 +70,10 @@ class Anchors(Arrays):
     it was behind it [m], shape (n,): the plastic part of the stretch across the blade. Else an edge
     that comes back beside where it cut would pull at once, with energy out of nothing."""
     energy: FloatArray
-    """Energy of the anchor there [J], shape (n,); 0 where it does not pull."""
+    """Energy of the anchor where its account began (`begin_account`) [J], shape (n,); 0 where it
+    did not pull."""
     stretch: FloatArray
-    """Vector from the anchor to its sample there [m], shape (n, 3)."""
+    """Vector from the anchor to the point that pulled on it then [m], shape (n, 3)."""
     impulse: FloatArray
     """Impulse of the anchor on the tissue since then [N s], shape (n, 3)."""
     speed: FloatArray
@@ -289,7 +290,7 @@ def energy_given(anchors: Anchors, k: int, stretch: Vec3, seconds: float) -> flo
     Args:
         anchors: The samples.
         k: The anchor.
-        stretch: Vector from the anchor to its sample now [m].
+        stretch: Vector from the anchor to the point of the blade that pulls on it now [m].
         seconds: Time since the account began [s].
     """
     energy: float = anchors.energy[k]
