@@ -69,11 +69,9 @@ class Anchors(Arrays):
     """Distance along the normal of the blade by which the edge has moved aside of the anchor while
     it was behind it [m], shape (n,): the plastic part of the stretch across the blade. Else an edge
     that comes back beside where it cut would pull at once, with energy out of nothing."""
-    energy: FloatArray
-    """Energy of the anchor where its account began (`begin_account`) [J], shape (n,); 0 where it
-    did not pull."""
     stretch: FloatArray
-    """Vector from the anchor to the point that pulled on it then [m], shape (n, 3)."""
+    """Vector from the anchor to the point that pulled on it where its account began
+    (`begin_account`) [m], shape (n, 3)."""
     impulse: FloatArray
     """Impulse of the anchor on the tissue since then [N s], shape (n, 3)."""
     speed: FloatArray
@@ -134,7 +132,6 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         is_new=np.zeros(n, dtype=np.bool_),
         pulls=np.zeros(n, dtype=np.bool_),
         offset=np.zeros(n),
-        energy=np.zeros(n),
         stretch=np.zeros((n, 3)),
         impulse=np.zeros((n, 3)),
         speed=np.zeros(n),
@@ -260,27 +257,17 @@ def stored_energy(
 
 
 @kernel
-def begin_account(
-    anchors: Anchors, k: int, stretch: Vec3, pose: BladePose, law: ToughnessLaw
-) -> None:
-    """Note what an anchor holds, from where its work is counted next.
-
-    Args:
-        anchors: The samples.
-        k: The anchor.
-        stretch: Vector from the anchor to the point of the blade that pulls on it [m].
-        pose: Pose of the blade.
-        law: Toughness of the tissue.
-    """
-    pulls = dot(stretch, pose.forward) >= 0.0
-    anchors.pulls[k] = pulls
-    anchors.energy[k] = stored_energy(anchors, k, stretch, pose, law) if pulls else 0.0
+def begin_account(anchors: Anchors, k: int, stretch: Vec3, pose: BladePose) -> None:
+    """Note how an anchor is stretched [m], from where its work is counted next."""
+    anchors.pulls[k] = dot(stretch, pose.forward) >= 0.0
     store(anchors.stretch, k, stretch)
     store(anchors.impulse, k, Vec3(0.0, 0.0, 0.0))
 
 
 @kernel
-def energy_given(anchors: Anchors, k: int, stretch: Vec3, seconds: float) -> float:
+def energy_given(
+    anchors: Anchors, k: int, stretch: Vec3, pose: BladePose, law: ToughnessLaw, seconds: float
+) -> float:
     """Return what an anchor held when its account began and the work done on it since then [J].
 
     The work is that of the mean force over the change of its stretch. Where an anchor begins or
@@ -291,13 +278,15 @@ def energy_given(anchors: Anchors, k: int, stretch: Vec3, seconds: float) -> flo
         anchors: The samples.
         k: The anchor.
         stretch: Vector from the anchor to the point of the blade that pulls on it now [m].
+        pose: Pose of the blade.
+        law: Toughness of the tissue.
         seconds: Time since the account began [s].
     """
-    energy: float = anchors.energy[k]
+    before = vec3(anchors.stretch, k)
+    energy = stored_energy(anchors, k, before, pose, law) if anchors.pulls[k] else 0.0
     if seconds == 0.0:
         return energy
-    change = sub(stretch, vec3(anchors.stretch, k))
-    return energy + dot(vec3(anchors.impulse, k), change) / seconds
+    return energy + dot(vec3(anchors.impulse, k), sub(stretch, before)) / seconds
 
 
 @inlined

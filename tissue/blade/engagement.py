@@ -13,6 +13,7 @@ from tissue.blade.anchors import (
     anchor_position,
     begin_account,
     pulling_point,
+    stored_energy,
 )
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
@@ -136,8 +137,9 @@ def anchor_beside(
             store(anchors.rest_area, k, vec3(anchors.rest_area, beside))
             anchors.offset[k] = anchors.offset[beside]
             stretch = sub(pulling_point(anchors, pose, k), here)
-            begin_account(anchors, k, stretch, pose, blade.toughness)
-            blade.totals.released -= anchors.energy[k]
+            begin_account(anchors, k, stretch, pose)
+            if anchors.pulls[k]:
+                blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
 
 
 @kernel
@@ -242,7 +244,7 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     anchors.slipped[k] = False
     anchors.is_new[k] = True
     anchors.pulls[k] = True
-    anchors.offset[k] = anchors.energy[k] = 0.0
+    anchors.offset[k] = 0.0
     store(anchors.stretch, k, Vec3(0.0, 0.0, 0.0))
     store(anchors.impulse, k, Vec3(0.0, 0.0, 0.0))
     anchors.rest_share[k] = 1.0

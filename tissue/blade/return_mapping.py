@@ -170,7 +170,7 @@ def relocate(blade: BladeState, body: Body, visits: Visits, edge: Edge, when: fl
             if state == ANCHORED:  # what the change of the mesh did to its energy is no work
                 a = anchor_position(anchors, body, body.positions, k)
                 stretch = sub(pulling_point(anchors, pose, k), a)
-                begin_account(anchors, k, stretch, pose, blade.toughness)
+                begin_account(anchors, k, stretch, pose)
 
 
 @kernel
@@ -198,7 +198,7 @@ def slip_anchors(
         pose: Pose of the blade.
         seconds: Time since the last call [s].
     """
-    anchors, totals = blade.anchors, blade.totals
+    anchors, totals, law = blade.anchors, blade.totals, blade.toughness
     n = len(anchors.state)
     for k in range(n):
         if anchors.state[k] != ANCHORED and anchors.state[k] != RETRACTED:
@@ -207,7 +207,7 @@ def slip_anchors(
         stretch = sub(pulling_point(anchors, pose, k), a)
         if dot(stretch, pose.forward) < 0.0:
             if anchors.pulls[k]:
-                totals.released += energy_given(anchors, k, stretch, seconds)
+                totals.released += energy_given(anchors, k, stretch, pose, law, seconds)
             _end_slip(blade, body, k, pose)
             is_far = abs(anchors.offset[k]) > blade.reach
             anchors.state[k] = FREE if is_far else RETRACTED
@@ -218,10 +218,12 @@ def slip_anchors(
                 continue
             anchors.state[k] = ANCHORED
         if not anchors.pulls[k]:
-            totals.released += energy_given(anchors, k, stretch, seconds)
-            totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
+            totals.released += energy_given(anchors, k, stretch, pose, law, seconds)
+            totals.released -= stored_energy(anchors, k, stretch, pose, law)
         _slip_anchor(blade, body, visits, k, a, stretch, pose)
-        if anchors.state[k] == ANCHORED:
+        if not anchors.slips[k]:
+            begin_account(anchors, k, stretch, pose)
+        elif anchors.state[k] == ANCHORED:
             _end_slip(blade, body, k, pose)
 
 
@@ -235,7 +237,7 @@ def _end_slip(blade: BladeState, body: Body, k: int, pose: BladePose) -> None:
         aside = dot(stretch, pose.normal)
         anchors.offset[k] += aside
         stretch = axpy(-aside, pose.normal, stretch)
-    begin_account(anchors, k, stretch, pose, blade.toughness)
+    begin_account(anchors, k, stretch, pose)
 
 
 @kernel
