@@ -34,7 +34,7 @@ from tissue.contact.penalty.eight_contacts import (
 from tissue.contact.penalty.line_of_action import weights_on_line
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, filled, lanes, load_lanes
+from tissue.core.simd import WIDTH, Lanes, filled, lanes, load_lanes
 from tissue.core.simd_gather import larger, larger_bits, where_larger
 from tissue.core.simd_rows import (
     add_to_row,
@@ -121,8 +121,12 @@ class PenaltyForces(Arrays):
     velocity: FloatArray
     """sum(w_i v_i) as a contact began to push in this substep [m/s], with the weights `spread`;
     shape (2 * capacity, 3)."""
+    listed_velocity: FloatArray
+    """sum(w_i v_i) at the same instant [m/s], with the weights of the list; alike."""
     couples: Couples
     """What keeps forces from turning the body where they are on no line with their reaction."""
+    turning: FloatArray
+    """Scratch: work of the couples of eight contacts [J]; shape (8,)."""
     acting: FloatArray
     """Scratch: the forces of eight contacts, and their pressures [N]; shape (8, 4)."""
     place: FloatArray
@@ -137,6 +141,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
     """Return no contacts, with room for that many."""
     rows = 2 * filled(capacity)
     of_floats = ("height", "stiffness", "offset", "largest_depth", "push")
+    of_vectors = ("anchor", "impulse", "velocity", "listed_velocity")
     return PenaltyForces(
         first=0,
         n_contacts=0,
@@ -155,9 +160,10 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         spread=np.zeros((rows, 4)),
         normal=np.zeros((rows, 3)),
         **{name: np.zeros(rows) for name in of_floats},
-        **{name: np.zeros((rows, 3)) for name in ("anchor", "impulse", "velocity")},
+        **{name: np.zeros((rows, 3)) for name in of_vectors},
         damping_time=np.full(rows, float(retardation_time)),
         couples=new_couples(rows),
+        turning=np.zeros(WIDTH),
         acting=np.zeros((WIDTH, 4)),
         place=np.arange(float(WIDTH)),
         friction=float(friction),
@@ -267,7 +273,7 @@ def _eight_forces(
     """Compute the forces of eight contacts, and add up their impulses; return which press.
 
     Args:
-        forces: `spread`, `acting`, `impulse` and `velocity` are written.
+        forces: `spread`, `acting`, `impulse`, `velocity` and `listed_velocity` are written.
         positions: Positions of the nodes [m].
         velocities: Their velocities [m/s].
         seconds: Weight of this evaluation in the integral over time [s].
@@ -297,18 +303,27 @@ def _eight_forces(
     before = three_of(forces.impulse, c)
     began = three_of(forces.velocity, c)
     has_begun, weight = dot(before, before), where_larger(is_acting, zero, lanes(seconds), zero)
-    began = Vec3(
-        where_larger(has_begun, zero, began.x, now.x),
-        where_larger(has_begun, zero, began.y, now.y),
-        where_larger(has_begun, zero, began.z, now.z),
-    )
+    began = _where_begun(has_begun, began, now)
+    listed = _where_begun(has_begun, three_of(forces.listed_velocity, c), velocity)
     store_rows_of_four(forces.spread, c, spread.a, spread.b, spread.c, spread.d)
     after = axpy(weight, total, before)
     store_rows_of_three(forces.impulse, c, after.x, after.y, after.z)
     store_rows_of_three(forces.velocity, c, began.x, began.y, began.z)
+    store_rows_of_three(forces.listed_velocity, c, listed.x, listed.y, listed.z)
     store_rows_of_four(forces.acting, 0, total.x, total.y, total.z, force)
     pressing = larger_bits(is_acting, zero)
     return _Bits(pressing, pressing & found.turning)
+
+
+@inlined
+def _where_begun(has_begun: Lanes, began: Vec3, now: Vec3) -> Vec3:
+    """Return what was noted of contacts that had begun to push, and what is now of the others."""
+    zero = lanes(0.0)
+    return Vec3(
+        where_larger(has_begun, zero, began.x, now.x),
+        where_larger(has_begun, zero, began.y, now.y),
+        where_larger(has_begun, zero, began.z, now.z),
+    )
 
 
 @inlined

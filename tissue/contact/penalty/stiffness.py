@@ -175,7 +175,11 @@ def split_masses(
 def _keep_force(
     forces: PenaltyForces, limits: Limits, body: Body, c: int, stiffness_before: float
 ) -> None:
-    """Set offset and anchor so that contact `c` pushes and rubs as before; a new one not at all."""
+    """Set offset and anchor so that contact `c` pushes and rubs as before; a new one not at all.
+
+    Where it is softer than it was it has less force, so that its springs hold no more energy than
+    they did.
+    """
     across = weighted_sum(forces, c, body.positions)
     normal = vec3(forces.normal, c)
     along = dot(normal, across)
@@ -183,9 +187,11 @@ def _keep_force(
     tangential = axpy(-along, normal, across)
     if forces.push[c] > 0.0:
         k = forces.stiffness[c]
+        share = math.sqrt(min(k / stiffness_before, 1.0))
+        forces.push[c] *= share
         forces.offset[c] = min(gap + forces.push[c] / k, limits.slack)
         stretch = sub(tangential, vec3(forces.anchor, c))
-        stretch = scale(stiffness_before / k, stretch)
+        stretch = scale(share * stiffness_before / k, stretch)
         store(forces.anchor, c, sub(tangential, stretch))
     else:
         forces.offset[c] = min(gap, 0.0)

@@ -75,6 +75,21 @@ def test_a_contact_keeps_its_force_where_the_stiffness_changes_and_a_new_one_has
     np.testing.assert_allclose(forces.push[:20][free], before[free], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("factor", [0.3, 3.0])
+def test_springs_hold_no_more_energy_than_before_where_the_stiffness_changes(seed, factor):
+    body, forces, _ = stiffened(seed)
+    scratch = np.zeros_like(body.positions)
+    forces.offset[:20] = 0.02e-3
+    end_contact_substep(forces, body.positions, body.velocities, scratch)
+    before = forces.stored
+    body.masses[:] *= factor
+    limits = new_limits(NODE_SIZE, ADDED)
+    split_masses(forces, limits, body, np.zeros(body.n_nodes), np.zeros(body.n_nodes))
+    end_contact_substep(forces, body.positions, body.velocities, scratch)
+    assert 0.0 < forces.stored < (1.0 + 1e-9) * before
+
+
 def test_an_overlap_without_force_comes_out_at_the_speed_of_recovery():
     body, forces, _ = stiffened(1)
     forces.push[:20] = 0.0
