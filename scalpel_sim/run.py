@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import structs
 
 from bridge import LinkError, TcpLink
-from scalpel_sim.errors import Interrupted, RunError, UsageError, one_line
+from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.resumption import RepeatedFrames
@@ -44,12 +44,6 @@ ENDED_IN_PAGE = "ended in the page"
 LONGEST_WAIT = 2.0
 """How long a run that is to end waits for a tissue in another process [s]."""
 
-MANY_SUBSTEPS = 200
-"""Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
-
-MOST_SUBSTEPS = 20_000
-"""Runge-Kutta steps in a frame at most. With the organ it takes 5 s, and a signal waits as long."""
-
 
 def perform(
     simulation: Simulation,
@@ -80,7 +74,6 @@ def perform(
             rest after the hand has ended.
 
     Raises:
-        UsageError: a frame takes more than `MOST_SUBSTEPS`.
         StateError: a run that goes on is made otherwise than it was.
         Interrupted: the user or the system ended the run.
         RunError: the run failed, or a file could not be written. The other files are.
@@ -99,7 +92,6 @@ def perform(
             views=views,
             log=log,
         )
-        _check_number_of_steps(simulation)
         start = _begin(simulation, outputs, scene, hand)
         simulation.pictures.append(into_replay(replay))
         until = None if hand is not None else seconds
@@ -300,25 +292,6 @@ def _scene_to_write(scene: Scene | None, hand: LedHand | None, outputs: Outputs)
         for each in scene.graspers
     ]
     return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
-
-
-def _check_number_of_steps(simulation: Simulation) -> None:
-    """Refuse frames that take so many Runge-Kutta steps that nothing can end one; warn of many.
-
-    Raises:
-        UsageError: a frame takes more than `MOST_SUBSTEPS`.
-    """
-    n_steps = simulation.dt / simulation.link.cut_report().now.time_step
-    if n_steps <= MANY_SUBSTEPS:
-        return
-    found = (
-        f"a frame takes {n_steps:,.0f} Runge-Kutta steps, because the tissue's elements are small, "
-        "stiff or light"
-    )
-    remedy = "Check --scale, or lower --young, or raise --density"
-    if n_steps > MOST_SUBSTEPS:
-        raise UsageError(f"{found}; at most {MOST_SUBSTEPS:,} are done. {remedy}")
-    _log.warning("%s: the run will take long. %s", found, remedy)
 
 
 def run_time(simulation: Simulation, seconds: float | None) -> float:

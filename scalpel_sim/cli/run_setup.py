@@ -29,6 +29,7 @@ from scalpel_sim.scene_body import check_scene, make_tissue
 from scalpel_sim.scene_parts.scene import LONGEST_RUN, Scene, changed
 from scalpel_sim.scenes import scene_of
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.steps_of_frames import check_steps_of_frames
 from scalpel_sim.stop_signals import loading
 from scalpel_sim.tables.toml import is_toml_file
 from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
@@ -136,7 +137,9 @@ def _prepared(
     else:
         link, scene, settings = _tissue_elsewhere(name, options, client.connect)
     try:
-        return link, scene, prepare(scene, link, is_led=is_led), settings
+        simulation = prepare(scene, link, is_led=is_led)
+        check_steps_of_frames(simulation)
+        return link, scene, simulation, settings
     except BaseException:
         link.close()
         raise

@@ -246,15 +246,3 @@ def test_options_change_the_gel_of_a_mesh_from_a_file(tmp_path):
     assert chosen_scene(None, TissueOptions(body=body)).material == GEL
     scene = chosen_scene(None, TissueOptions(body=body, material=tougher))
     assert scene.material == replace(GEL, toughness=60.0)
-
-
-def test_a_body_that_makes_a_run_slow_gets_a_warning(tmp_path, caplog):
-    perform_in(tmp_path, prepare(changed(GRID2, young_modulus=1e10, toughness=2e7)), seconds=0.002)
-    assert re.search(r"a frame takes [\d,]+ Runge-Kutta steps.*--young", caplog.text)
-
-
-def test_a_body_whose_frames_no_signal_could_end_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("scalpel_sim.run.MOST_SUBSTEPS", 300)
-    stiff = changed(GRID2, young_modulus=1e10, toughness=2e7)
-    with pytest.raises(ValueError, match=r"a frame takes [\d,]+ .*; at most 300 are done.*--young"):
-        perform_in(tmp_path, prepare(stiff), seconds=0.002)

@@ -1,0 +1,33 @@
+"""How many Runge-Kutta steps the frames of a run take: many get a warning, too many are refused."""
+
+import logging
+
+from scalpel_sim.errors import UsageError
+from scalpel_sim.simulation import Simulation
+
+MANY_SUBSTEPS = 200
+"""Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
+
+MOST_SUBSTEPS = 20_000
+"""Runge-Kutta steps in a frame at most. With the organ it takes 5 s, and a signal waits as long."""
+
+_log = logging.getLogger(__name__)
+
+
+def check_steps_of_frames(simulation: Simulation) -> None:
+    """Refuse frames that take so many Runge-Kutta steps that nothing can end one; warn of many.
+
+    Raises:
+        UsageError: a frame takes more than `MOST_SUBSTEPS`.
+    """
+    n_steps = simulation.dt / simulation.link.cut_report().now.time_step
+    if n_steps <= MANY_SUBSTEPS:
+        return
+    found = (
+        f"a frame takes {n_steps:,.0f} Runge-Kutta steps, because the tissue's elements are small, "
+        "stiff or light"
+    )
+    remedy = "Check --scale, or lower --young, or raise --density"
+    if n_steps > MOST_SUBSTEPS:
+        raise UsageError(f"{found}; at most {MOST_SUBSTEPS:,} are done. {remedy}")
+    _log.warning("%s: the run will take long. %s", found, remedy)
