@@ -63,7 +63,11 @@ def opened(browser, view, leads=True):
 
 
 def drag(tab, right, down, button="left", key=None):
-    """Drag by so many pixels, without haste, while a key is pressed."""
+    """Drag by so many pixels, without haste, while a key is pressed.
+
+    Let go once the picture shows all that was asked: on a busy machine the tissue is behind, and a
+    blade that is let go stops where it is.
+    """
     x, y = tab.evaluate(LAID_BARE)
     tab.mouse.move(x, y)
     if key is not None:
@@ -72,6 +76,7 @@ def drag(tab, right, down, button="left", key=None):
     for i in range(1, STEPS_OF_DRAG + 1):
         tab.mouse.move(x + right * i / STEPS_OF_DRAG, y + down * i / STEPS_OF_DRAG)
         time.sleep(PAUSE)
+    until_the_tip_rests(tab)
     tab.mouse.up(button=button)
     if key is not None:
         tab.keyboard.up(key)
@@ -83,8 +88,14 @@ def tip(tab):
 
 
 def until_it_rests(tab):
-    """Wait until the picture shows all that was done, and the blade in it no longer moves."""
-    tab.wait_for_function("hand.unshown.length === 0 && !hand.isEngaged")
+    """Wait until nothing leads the blade, and it no longer moves."""
+    tab.wait_for_function("!hand.isEngaged")
+    until_the_tip_rests(tab)
+
+
+def until_the_tip_rests(tab):
+    """Wait until the picture shows all that was asked, and the blade in it no longer moves."""
+    tab.wait_for_function("hand.unshown.length === 0")
     before = None
     while before is None or not np.array_equal(before, tip(tab)):
         before = tip(tab)
