@@ -1,5 +1,6 @@
 """Reads a TOML file, and checks it against its tables."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +16,13 @@ SUFFIX = ".toml"
 
 LARGEST_FILE = 1 << 22
 """Largest file [byte]: those that people write have some thousand."""
+
+MOST_PARTS = 20
+"""Parts of a key at most. Those of our files have one to three; Python's parser takes memory by the
+square of their number, 250 MB for 8,000."""
+
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
 
 Content = TypeVar("Content", bound=msgspec.Struct)
 
@@ -32,12 +40,17 @@ def read_toml(path: Path, how_to_begin: str) -> dict[str, Any]:
         how_to_begin: Where one to start from comes from, for messages.
 
     Raises:
-        UsageError: the file cannot be read, has more than `LARGEST_FILE`, or is no TOML.
+        UsageError: the file cannot be read, has more than `LARGEST_FILE` or a key of more than
+            `MOST_PARTS`, or is no TOML.
     """
     try:
         text = read_text_file(path, LARGEST_FILE)
     except UsageError as error:
         raise UsageError(f"{path} cannot be read: {error}; {how_to_begin}") from error
+    if _LONG_KEY.search(text):
+        raise UsageError(
+            f"{path} cannot be read: a key in it has more than {MOST_PARTS} parts; {how_to_begin}"
+        )
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
