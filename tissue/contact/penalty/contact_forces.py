@@ -125,7 +125,7 @@ class PenaltyForces(Arrays):
     """sum(w_i v_i) at the same instant [m/s], with the weights of the list; alike."""
     couples: Couples
     """What keeps forces from turning the body where they are on no line with their reaction."""
-    turning: FloatArray
+    work_of_couples: FloatArray
     """Scratch: work of the couples of eight contacts [J]; shape (8,)."""
     acting: FloatArray
     """Scratch: the forces of eight contacts, and their pressures [N]; shape (8, 4)."""
@@ -163,7 +163,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         **{name: np.zeros((rows, 3)) for name in of_vectors},
         damping_time=np.full(rows, float(retardation_time)),
         couples=new_couples(rows),
-        turning=np.zeros(WIDTH),
+        work_of_couples=np.zeros(WIDTH),
         acting=np.zeros((WIDTH, 4)),
         place=np.arange(float(WIDTH)),
         friction=float(friction),

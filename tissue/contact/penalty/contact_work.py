@@ -2,9 +2,9 @@
 
 The force of a contact acts where it and its reaction are on one line (`line_of_action`), its depth
 is that of the listed points. As the sides turn together the two do not move alike, and the force
-does work of which the spring knows nothing. Where that is more than the spring gave up, it gives up
-the rest: its offset shrinks. Without that, a node that was pressed deep beside a small face drove a
-flap of a cut block round at 0.2 m/s without end.
+does work that is not in the energy of the spring. Where that is more than the spring gave up, it
+gives up the rest: its offset shrinks. Without that, a node that was pressed deep beside a small
+face kept a flap of a cut block swinging at 0.2 m/s without end.
 """
 
 from tissue.contact.penalty.contact_forces import PenaltyForces, clear_contact_forces
@@ -128,12 +128,12 @@ def _count_work(
         more = work - where_larger(has_begun, zero, half * dot(before, listed), zero)
     store_rows_of_three(forces.impulse, c, zero, zero, zero)
     if forces.couples.have_acted == 1:
-        store_lanes(forces.turning, 0, zero)
+        store_lanes(forces.work_of_couples, 0, zero)
         for i in range(n):
-            turning = work_of_couple(forces.couples, forces.node, c + i, positions, velocities)
-            forces.turning[i] = turning
-            forces.work += turning
-        more = more + load_lanes(forces.turning, 0)
+            of_couple = work_of_couple(forces.couples, forces.node, c + i, positions, velocities)
+            forces.work_of_couples[i] = of_couple
+            forces.work += of_couple
+        more = more + load_lanes(forces.work_of_couples, 0)
     return more
 
 
