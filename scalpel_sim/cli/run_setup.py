@@ -20,6 +20,7 @@ from scalpel_sim.cli.options import (
     given_options,
 )
 from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
+from scalpel_sim.cli.steps_of_frames import check_steps_of_frames
 from scalpel_sim.errors import Interrupted, UsageError
 from scalpel_sim.output.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.output.export import check_exports
@@ -29,7 +30,6 @@ from scalpel_sim.scene_body import check_scene, make_tissue
 from scalpel_sim.scene_parts.scene import LONGEST_RUN, Scene, changed
 from scalpel_sim.scenes import scene_of
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.steps_of_frames import check_steps_of_frames
 from scalpel_sim.stop_signals import loading
 from scalpel_sim.tables.toml import is_toml_file
 from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
