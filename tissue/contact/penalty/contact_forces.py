@@ -29,12 +29,13 @@ from tissue.contact.penalty.eight_contacts import (
     share_within,
     smaller,
     three_of,
+    vectors_where_positive,
     where_positive,
 )
 from tissue.contact.penalty.line_of_action import weights_on_line
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, Lanes, filled, lanes, load_lanes
+from tissue.core.simd import WIDTH, filled, lanes, load_lanes
 from tissue.core.simd_gather import larger, larger_bits, where_larger
 from tissue.core.simd_rows import (
     add_to_row,
@@ -303,8 +304,9 @@ def _eight_forces(
     before = three_of(forces.impulse, c)
     began = three_of(forces.velocity, c)
     has_begun, weight = dot(before, before), where_larger(is_acting, zero, lanes(seconds), zero)
-    began = _where_begun(has_begun, began, now)
-    listed = _where_begun(has_begun, three_of(forces.listed_velocity, c), velocity)
+    began = vectors_where_positive(has_begun, began, now)
+    listed_before = three_of(forces.listed_velocity, c)
+    listed = vectors_where_positive(has_begun, listed_before, velocity)
     store_rows_of_four(forces.spread, c, spread.a, spread.b, spread.c, spread.d)
     after = axpy(weight, total, before)
     store_rows_of_three(forces.impulse, c, after.x, after.y, after.z)
@@ -313,17 +315,6 @@ def _eight_forces(
     store_rows_of_four(forces.acting, 0, total.x, total.y, total.z, force)
     pressing = larger_bits(is_acting, zero)
     return _Bits(pressing, pressing & found.turning)
-
-
-@inlined
-def _where_begun(has_begun: Lanes, began: Vec3, now: Vec3) -> Vec3:
-    """Return what was noted of contacts that had begun to push, and what is now of the others."""
-    zero = lanes(0.0)
-    return Vec3(
-        where_larger(has_begun, zero, began.x, now.x),
-        where_larger(has_begun, zero, began.y, now.y),
-        where_larger(has_begun, zero, began.z, now.z),
-    )
 
 
 @inlined

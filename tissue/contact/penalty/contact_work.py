@@ -10,12 +10,14 @@ face kept a flap of a cut block swinging at 0.2 m/s without end.
 from tissue.contact.penalty.contact_forces import PenaltyForces, clear_contact_forces
 from tissue.contact.penalty.couples import work_of_couple
 from tissue.contact.penalty.eight_contacts import (
+    TINY,
     combined,
     four_of,
     points_of_contacts,
     share_within,
     smaller,
     three_of,
+    vectors_where_positive,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
@@ -23,10 +25,7 @@ from tissue.core.simd import WIDTH, Lanes, lanes, load_lanes, square_root, store
 from tissue.core.simd_blocks import sum_of_lanes
 from tissue.core.simd_gather import larger, larger_bits, largest, where_larger
 from tissue.core.simd_rows import store_rows_of_three
-from tissue.core.vec3 import Vec3, add, axpy, dot, scale, sub
-
-_TINY = 1e-300
-"""Stands for 0 where it divides."""
+from tissue.core.vec3 import add, axpy, dot, scale, sub
 
 
 @kernel
@@ -82,11 +81,8 @@ def _end_eight(
     stretch = scale(share, stretch)
     slid = sub(tangential, stretch)
     # What has let go is slack where it is; what holds keeps its anchor to the last bit.
-    anchor = Vec3(
-        where_larger(free, zero, where_larger(one, share, slid.x, anchor.x), tangential.x),
-        where_larger(free, zero, where_larger(one, share, slid.y, anchor.y), tangential.y),
-        where_larger(free, zero, where_larger(one, share, slid.z, anchor.z), tangential.z),
-    )
+    anchor = vectors_where_positive(one - share, slid, anchor)
+    anchor = vectors_where_positive(free, anchor, tangential)
     store_rows_of_three(forces.anchor, c, anchor.x, anchor.y, anchor.z)
     store_lanes(forces.push, c, k * depth)
     if pressing == 0:
@@ -150,8 +146,8 @@ def _free_after(free: Lanes, largest_depth: Lanes, stiffness: Lanes, gained: Lan
     zero, half = lanes(0.0), lanes(0.5)
     depth, kink = smaller(free, largest_depth), half * largest_depth * largest_depth
     held = where_larger(free, zero, depth * (free - half * depth), zero)
-    left = larger(held - gained / larger(stiffness, lanes(_TINY)), zero)
+    left = larger(held - gained / larger(stiffness, lanes(TINY)), zero)
     rising = square_root(left + left)
-    flat = (left + kink) / larger(largest_depth, lanes(_TINY))
+    flat = (left + kink) / larger(largest_depth, lanes(TINY))
     given = where_larger(left, kink, flat, rising)
     return where_larger(held, zero, where_larger(gained, zero, given, free), free)

@@ -9,8 +9,8 @@ from tissue.core.simd_gather import larger, larger_bits, where_larger
 from tissue.core.simd_rows import points_of_column, rows_of_four, rows_of_three
 from tissue.core.vec3 import Vec3, axpy, dot, scale
 
-_TINY = 1e-300
-"""Stands for a length of 0 where it divides."""
+TINY = 1e-300
+"""Stands for 0 where it divides."""
 
 
 class Four(NamedTuple):
@@ -82,6 +82,17 @@ def where_positive(a: Lanes, this: Four, other: Four) -> Four:
 
 
 @inlined
+def vectors_where_positive(a: Lanes, this: Vec3, other: Vec3) -> Vec3:
+    """Return `this` where `a` is positive, and `other` elsewhere."""
+    zero = lanes(0.0)
+    return Vec3(
+        where_larger(a, zero, this.x, other.x),
+        where_larger(a, zero, this.y, other.y),
+        where_larger(a, zero, this.z, other.z),
+    )
+
+
+@inlined
 def smaller(a: Lanes, b: Lanes) -> Lanes:
     """Return the smaller of two numbers."""
     return where_larger(a, b, b, a)
@@ -94,4 +105,4 @@ def share_within(longest: Lanes, a: Vec3) -> Lanes:
     if larger_bits(square, longest * longest) == 0:
         return one
     size = square_root(square)
-    return where_larger(size, longest, longest / larger(size, lanes(_TINY)), one)
+    return where_larger(size, longest, longest / larger(size, lanes(TINY)), one)

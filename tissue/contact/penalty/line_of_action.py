@@ -15,7 +15,7 @@ Eight contacts at a time: each number is a vector of eight.
 
 from typing import NamedTuple
 
-from tissue.contact.penalty.eight_contacts import Four, FourPoints, combined
+from tissue.contact.penalty.eight_contacts import TINY, Four, FourPoints, combined
 from tissue.core.jit import inlined
 from tissue.core.simd import Lanes, lanes
 from tissue.core.simd_gather import larger, larger_bits, where_larger
@@ -24,9 +24,6 @@ from tissue.core.vec3 import Vec3, axpy, cross, dot, scale, sub
 _LARGEST_SHIFT = 0.3
 """By how much a weight may differ from the listed one. More: deep overlaps act far from where they
 are; the stable step is that of the listed weights. Less: more is left to couples."""
-
-_TINY = 1e-300
-"""Stands for 0 where it divides."""
 
 
 class _Shift(NamedTuple):
@@ -71,7 +68,7 @@ def weights_on_line(x: FourPoints, listed: Four, force: Vec3) -> OnLine:
         )
     most = larger(larger(_size(shift.p), _size(shift.q)), _size(shift.p + shift.q))
     longest, square = lanes(1.0 / _LARGEST_SHIFT) * most, shift.per * shift.per
-    share = shift.per / larger(larger(square, longest * longest), lanes(_TINY))
+    share = shift.per / larger(larger(square, longest * longest), lanes(TINY))
     p, q = share * shift.p, share * shift.q
     on_face = Four(zero, p + q, zero - p, zero - q)
     moved = Four(
