@@ -1,4 +1,4 @@
-"""Stiffness of the contacts by mass splitting, and offsets that keep forces continuous.
+"""Stiffness of the contacts by mass splitting, and offsets by which their forces go on.
 
 A node of mass m_i whose share in all contacts is S_i = sum_c |w_ci| may bear the stiffness
 m_i W_i^2. With
@@ -138,10 +138,10 @@ def split_masses(
     frequency_squared: FloatArray,
     share: FloatArray,
 ) -> None:
-    """Write the stiffness of every contact; what has a force keeps it by its offset.
+    """Write the stiffness of every contact; what has a force goes on by its offset (`_keep_force`).
 
     Args:
-        forces: Stiffness, damping, offset, greatest depth, anchors and masses are written.
+        forces: Stiffness, damping, offset, greatest depth, push, anchors and masses are written.
             `stiffness` is as it was in the last list, or 0.
         limits: How stiff contact may be.
         body: Masses and positions.
