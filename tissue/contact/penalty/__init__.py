@@ -9,7 +9,7 @@ In the order in which they are best read:
     eight_contacts     vectors of eight contacts
     line_of_action     where a force acts, so that it and its reaction turn nothing
     couples            what takes their torque where there is no such place
-    stiffness          stiffness by mass splitting, and offsets that keep forces continuous
+    stiffness          stiffness by mass splitting, and offsets by which their forces go on
     contact_list       one contact for each direction in which a node is pushed
     ridge_contacts     one contact for each pair of ridges that cross
     contact_rows       how a contact begins, and goes on with the force of another
