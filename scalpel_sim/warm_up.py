@@ -1,20 +1,20 @@
-"""Compiles the kernels that a scene needs, in two processes, and loads them.
+"""Compiles the kernels that scenes need, in several processes, and loads them.
 
     python -m scalpel_sim.warm_up motion|cut KERNELS
 
-is one of the two processes; KERNELS is a `KernelSet` as JSON.
+is one of the processes; KERNELS is a `KernelSet` as JSON.
 """
 
 import gc
 import json
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -126,49 +126,74 @@ def prepare_kernels(
     sets: Sequence[KernelSet] = USUAL_SETS, on_progress: Progress = lambda n, n_all: None
 ) -> None:
     """Load the kernels, or compile them where this is the first run of these sources."""
+    compile_ahead(sets, on_progress)
     for kernels in sets:
-        compile_ahead(kernels, on_progress)
         _cut(kernels)
         _move(kernels)
 
 
-def compile_ahead(kernels: KernelSet, on_progress: Progress = lambda n, n_all: None) -> None:
-    """Compile the kernels of a set in two processes, where the cache does not have them.
+def compile_ahead(sets: Sequence[KernelSet], on_progress: Progress = lambda n, n_all: None) -> None:
+    """Compile the kernels of some sets by all cores, where the cache does not have them.
 
-    The cache passes on the binaries. What they do not compile is compiled where it is used.
+    Two processes compile the first set, and with it most of what the others share; then as many as
+    there are cores compile the others. The cache passes on the binaries. What they do not compile
+    is compiled where it is used.
     """
-    if kernels_are_compiled(kernels) or not is_compiling():
+    missing = [kernels for kernels in sets if not kernels_are_compiled(kernels)]
+    if not (missing and is_compiling()):
         return
-    with _processes(kernels) as processes, StopSignals() as stop:
-        while any(process.poll() is None for process in processes):
-            if stop.reason is not None:
-                raise SignalInterrupt(stop.reason)
-            found = n_compiled_kernels()
-            on_progress(found, max(found, USUAL_NUMBER))
-            time.sleep(_SECONDS_PER_LOOK)
-        if not any(process.returncode for process in processes):
-            found = n_compiled_kernels()
-            on_progress(found, found)
-            _note(kernels)
+    n_cores = max(os.cpu_count() or 1, len(_JOBS))
+    with _Processes() as processes, StopSignals() as stop:
+        for group in (missing[:1], missing[1:]):
+            waiting = [(job, kernels) for kernels in group for job in _JOBS]
+            while waiting or processes.n_running:
+                if stop.reason is not None:
+                    raise SignalInterrupt(stop.reason)
+                while waiting and processes.n_running < n_cores:
+                    processes.start(*waiting.pop(0))
+                found = n_compiled_kernels()
+                on_progress(found, max(found, USUAL_NUMBER))
+                time.sleep(_SECONDS_PER_LOOK)
+        done = [kernels for kernels in missing if processes.have_done(kernels)]
+    for kernels in done:
+        _note(kernels)
+    if done == missing:
+        found = n_compiled_kernels()
+        on_progress(found, found)
 
 
-@contextmanager
-def _processes(kernels: KernelSet) -> Iterator[list["subprocess.Popen[bytes]"]]:
-    """Start the two processes, and end them where this one is interrupted."""
-    started = [
-        subprocess.Popen(
+class _Processes:
+    """Processes that compile; those that still run are ended where this one is interrupted."""
+
+    def __init__(self) -> None:
+        self._started: list[tuple[KernelSet, subprocess.Popen[bytes]]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for _kernels, process in self._started:
+            process.kill()
+            process.wait()
+
+    @property
+    def n_running(self) -> int:
+        """Number of processes that have not ended."""
+        return sum(process.poll() is None for _, process in self._started)
+
+    def start(self, job: str, kernels: KernelSet) -> None:
+        """Start a process that does one of `_JOBS` for a set."""
+        process = subprocess.Popen(
             [sys.executable, "-m", "scalpel_sim.warm_up", job, json.dumps(kernels)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        for job in _JOBS
-    ]
-    try:
-        yield started
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
+        self._started.append((kernels, process))
+
+    def have_done(self, kernels: KernelSet) -> bool:
+        """Return whether all jobs of a set have ended well."""
+        codes = [process.returncode for each, process in self._started if each == kernels]
+        return len(codes) == len(_JOBS) and not any(codes)
 
 
 def _mark(kernels: KernelSet) -> Path:
@@ -270,7 +295,7 @@ def _edge(fraction: float) -> BladeSegment:
 
 
 _JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move, "cut": _incise_and_cut}
-"""What the two processes do. Each takes half of the time."""
+"""What two processes do for a set. Each takes half of the time."""
 
 
 if __name__ == "__main__":

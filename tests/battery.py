@@ -1,4 +1,6 @@
-"""Batteries: tests of many random cases, few for each change and many with `pytest --long`.
+"""Batteries: tests of many random cases, few with `pytest -m long` and many with `pytest --long`.
+
+`pytest` alone runs none; CI runs the few of each for each change.
 
 A battery is a test with an argument `case`, the seed from which all of the case is drawn:
 
@@ -20,6 +22,9 @@ from time import perf_counter
 from typing import NamedTuple
 
 import pytest
+
+WITHOUT_BATTERIES = "not long"
+"""The tests that `pytest` runs, as `addopts` has it; `pytest -m long` runs the others."""
 
 MOST_FAILURES = 20
 """Failing cases after which a group of cases ends: enough to see what they have in common."""
@@ -95,6 +100,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="FIRST:LAST",
         help="run only these cases of each battery; LAST is not run, as in a slice",
     )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Run batteries where an option asks for them; by default no test with their mark is run."""
+    asked = any(config.getoption(name) is not None for name in ("case", "cases"))
+    if (asked or config.getoption("long")) and config.option.markexpr == WITHOUT_BATTERIES:
+        config.option.markexpr = ""
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -1,12 +1,14 @@
 """The program in a process of its own."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import sleep
+from typing import Any
 
 from scalpel_sim.stop_signals import SIGNALS
 
@@ -47,3 +49,14 @@ def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:
     while not (forces.exists() and forces.stat().st_size > 20_000):
         assert program.poll() is None, program.communicate()
         sleep(0.02)
+
+
+def wait_until_heard(program: subprocess.Popen[Any]) -> None:
+    """Wait until the program that was just started handles signals; Python knows SIGINT before."""
+    status, bit = Path(f"/proc/{program.pid}/status"), 1 << (signal.SIGTERM - 1)
+    while True:
+        (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status.read_text(), re.M)
+        if int(mask, 16) & bit:
+            return
+        assert program.poll() is None
+        sleep(0.002)

@@ -1,26 +1,28 @@
 """A disk of a few megabytes, in memory, which a run can fill: a namespace of its own mounts it."""
 
-import functools
 import shlex
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 from tests.processes import environment
 
 NAMESPACE = ("unshare", "--map-root-user", "--mount", "sh", "-c")
 
 
-@functools.cache
-def small_disks_are_allowed() -> bool:
-    """Return whether the system lets this process mount one."""
+@pytest.fixture(scope="session")
+def small_disks() -> None:
+    """Skip the test if the system does not let this process mount a small disk."""
     try:
         done = subprocess.run(
             [*NAMESPACE, "mount -t tmpfs none /mnt"], capture_output=True, timeout=30
         )
     except OSError:
-        return False
-    return done.returncode == 0
+        done = None
+    if done is None or done.returncode != 0:
+        pytest.skip("no right to mount a small disk")
 
 
 def run_on_a_full_disk(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:

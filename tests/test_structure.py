@@ -99,3 +99,8 @@ def test_every_folder_says_what_it_holds(package):
         f for f in folders if not ast.get_docstring(ast.parse((f / "__init__.py").read_text()))
     ]
     assert without_docstring == []
+
+
+def test_no_test_module_calls_a_kernel_as_it_is_imported(kernels_at_import):
+    """Each process of the tests imports all modules, and would compute the same again."""
+    assert kernels_at_import == []

@@ -43,8 +43,7 @@ def warm_up(
         chosen: Sequence[str | None] = list(SCENES) if every else scenes or (None,)
         sets = _sets(chosen, tissue)
         with compiling(printing) as on_progress:
-            for kernels in sets:
-                compile_ahead(kernels, on_progress)
+            compile_ahead(sets, on_progress)
         if not all(map(kernels_are_compiled, sets)):
             raise RunError(
                 "the kernels could not be compiled, or not be written; set NUMBA_CACHE_DIR to a "

@@ -10,7 +10,7 @@ import pytest
 from scalpel_sim.output.run_folder import RUN_FILES
 from tests.battery import battery
 from tests.run_files import names_in
-from tests.small_disk import run_on_a_small_disk, small_disks_are_allowed
+from tests.small_disk import run_on_a_small_disk
 from tests.whole_runs import broken_files
 
 ROOM = (31e6, 60e6)
@@ -19,7 +19,7 @@ LONGEST = 5.0
 """When the disk is filled at the latest [s]: by then most runs have ended."""
 
 
-@pytest.mark.skipif(not small_disks_are_allowed(), reason="no right to mount a small disk")
+@pytest.mark.usefixtures("small_disks")
 @battery(n_per_change=4, n_long=200)
 def test_a_full_disk_ends_a_run_by_its_name_and_leaves_whole_files(case):
     random = np.random.default_rng(case)

@@ -15,9 +15,9 @@ import pytest
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.run_folder import RUN_FILES, STROKE
-from tests.processes import PROGRAM, environment, start, wait_for_rows
+from tests.processes import PROGRAM, environment, start, wait_for_rows, wait_until_heard
 from tests.run_files import names_in
-from tests.small_disk import run_on_a_small_disk, small_disks_are_allowed
+from tests.small_disk import run_on_a_small_disk
 from tests.whole_runs import broken_files
 
 LONG = ("--seconds", "1000")
@@ -49,7 +49,7 @@ def test_a_folder_whose_run_was_killed_takes_another_run_and_nothing_of_the_firs
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_the_program_is_loaded_is_said_in_one_line(number, tmp_path):
     program = start("run", "grid2", "--out", str(tmp_path / "run"))
-    time.sleep(0.3)  # Python has started, and the packages are being loaded
+    wait_until_heard(program)  # the packages are being loaded
     program.send_signal(number)
     _, err = program.communicate(timeout=60)
     assert program.returncode == 1
@@ -62,7 +62,7 @@ def test_a_signal_while_the_program_is_loaded_leaves_a_terminal_with_its_cursor(
     with os.fdopen(ours, "rb", buffering=0) as terminal:
         program = subprocess.Popen([*PROGRAM, "run"], stderr=theirs, env=environment())
         os.close(theirs)
-        time.sleep(0.3)
+        wait_until_heard(program)  # the packages are being loaded
         program.terminate()
         assert program.wait(timeout=60) == 1
         assert terminal.read(1000).endswith(b"\x1b[?25herror: interrupted by SIGTERM\r\n")
@@ -143,7 +143,7 @@ def test_a_signal_while_files_are_written_leaves_them_whole(tmp_path):
     assert not broken_files(tmp_path)
 
 
-@pytest.mark.skipif(not small_disks_are_allowed(), reason="no right to mount a small disk")
+@pytest.mark.usefixtures("small_disks")
 @pytest.mark.parametrize(
     ("megabytes", "message"),
     [(1, "initial.vtu|no room for"), (20, "no room for 2. MB"), (200, None)],

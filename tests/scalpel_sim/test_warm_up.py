@@ -1,4 +1,4 @@
-"""The first run compiles in two processes; later ones, also of a copied cache, compile nothing."""
+"""The first run compiles in several processes; a later one, or a copied cache, compiles nothing."""
 
 import json
 import os
@@ -90,7 +90,7 @@ def test_what_is_compiled_ahead_is_done_to_its_end(kernels, job):
 
 def test_a_first_run_compiles_in_two_processes_and_waits_for_them(started):
     shown = []
-    compile_ahead(SMALL, lambda done, total: shown.append((done, total)))
+    compile_ahead([SMALL], lambda done, total: shown.append((done, total)))
     assert [process.args[3] for process in started] == ["motion", "cut"]
     assert [process.returncode for process in started] == [0, 0]
     assert kernels_are_compiled(SMALL)
@@ -98,23 +98,35 @@ def test_a_first_run_compiles_in_two_processes_and_waits_for_them(started):
     assert shown[-1][0] == shown[-1][1] > 100
 
 
+def test_sets_are_compiled_one_first_and_the_others_by_all_cores(started):
+    others = [SMALL._replace(audit=not SMALL.audit), SMALL._replace(relaxation="verlet")]
+    running = []
+    compile_ahead(
+        [SMALL, *others],
+        lambda *_: running.append(sum(each.poll() is None for each in started)),
+    )
+    asked = [KernelSet(*json.loads(process.args[4])) for process in started]
+    assert asked == [kernels for kernels in (SMALL, *others) for _ in ("motion", "cut")]
+    assert max(running) <= max(os.cpu_count(), 2)
+
+
 def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started):
     def interrupt(done, total):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        compile_ahead(SMALL, interrupt)
+        compile_ahead([SMALL], interrupt)
     assert all(process.returncode is not None for process in started)
 
 
 def test_a_later_run_starts_none(started, monkeypatch):
     monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda kernels: True)
-    compile_ahead(SMALL)
+    compile_ahead([SMALL])
     assert not started
 
 
 def test_a_copied_cache_serves_a_copied_program_without_compiling(tmp_path):
-    compile_ahead(SMALL)
+    compile_ahead([SMALL])
     compiled = cache_directory()
     shutil.copytree(compiled, tmp_path / "cache" / "kernels" / compiled.name)
     for name in ("tissue", "bridge", "scalpel_sim"):

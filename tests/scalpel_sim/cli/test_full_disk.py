@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.small_disk import run_on_a_full_disk, small_disks_are_allowed
+from tests.small_disk import run_on_a_full_disk
 
 WORDS = {
     "key": ("key", "/mnt/new.key"),
@@ -13,9 +13,7 @@ WORDS = {
     "figure": ("figure", "11", "--output", "/mnt/new.png"),
 }
 
-pytestmark = pytest.mark.skipif(
-    not small_disks_are_allowed(), reason="no right to mount a small disk"
-)
+pytestmark = pytest.mark.usefixtures("small_disks")
 
 
 @pytest.mark.parametrize("words", WORDS.values(), ids=WORDS)

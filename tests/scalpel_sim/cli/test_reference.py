@@ -78,8 +78,9 @@ def test_commands_share_the_groups_that_are_about_the_tissue(command):
 
 
 def examples() -> list[str]:
-    """Return the commands that the help shows, without the usage of each."""
-    found = re.findall(r"^(?:\w+=\S+ )?scalpel-sim ([a-z].*)$", reference(), re.MULTILINE)
+    """Return the commands that the page shows, without the usage of each."""
+    page = PAGE.read_text(encoding="utf-8")
+    found = re.findall(r"^(?:\w+=\S+ )?scalpel-sim ([a-z].*)$", page, re.MULTILINE)
     return [line for line in found if "[OPTIONS]" not in line]
 
 

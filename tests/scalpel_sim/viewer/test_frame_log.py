@@ -11,8 +11,6 @@ from scalpel_sim.viewer.replay import BYTES_PER_TRIANGLE, ReplayWriter
 from tests.scalpel_sim.little_arm import little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 
-WHOLE = cut_tissue()[0]
-
 
 def state(i):
     """Return what a frame shows: of three that follow each other, or of another such three."""
@@ -64,14 +62,14 @@ def test_a_log_that_is_shorter_than_its_mark_is_refused(tmp_path):
 
 @pytest.mark.parametrize("at", [1, 30, 70])
 def test_a_replay_that_is_gone_on_with_is_that_of_a_whole_run(at, tmp_path, monkeypatch):
-    limit = 20 * len(WHOLE.triangles) * BYTES_PER_TRIANGLE  # so that frames are dropped
+    limit = 20 * len(cut_tissue()[0].triangles) * BYTES_PER_TRIANGLE  # so that frames are dropped
     monkeypatch.setattr(replay_module, "FILE_LIMIT", limit)
     model, data = little_arm()
 
     def play(replay, first, end):
         for i in range(first, end):
             if replay.is_due(0.04 * i):
-                replay.add(0.04 * i, WHOLE, body_poses(data), readings(0.04 * i))
+                replay.add(0.04 * i, cut_tissue()[0], body_poses(data), readings(0.04 * i))
 
     log = FrameLog(tmp_path / "b")
     whole, killed = ReplayWriter(model, log=FrameLog(tmp_path / "a")), ReplayWriter(model, log=log)
