@@ -29,6 +29,8 @@ MESH = bodies.jittered(4, 0)
 STROKE = list(strokes.sweeps(strokes.THROUGH["slanted"](MESH)))
 MIDDLE = len(STROKE) // 2
 N_AFTER = 50
+INSTANTS = (0, 1, *range(40, len(STROKE) - 2, 80), len(STROKE) - 2)
+"""Frames before which a state is saved: the blade comes, touches, cuts, and has left."""
 BLADE = BladeShape()
 SPRINGS = Material(law="springs", poisson_ratio=0.25)
 
@@ -103,6 +105,19 @@ CASES = {
     "moved": Case(drive=shift),
 }
 
+LINES = {
+    "line, springs": Case(material=SPRINGS, blade=None),
+    "line, stiffening": Case(material=Material(law="yeoh", yeoh_second=1.0), blade=None),
+    "line, verlet": Case(SolverSettings(relaxation="verlet"), blade=None),
+    "line, hierarchical": Case(SolverSettings(relaxation="hierarchical"), SPRINGS, blade=None),
+    "line, single precision": Case(SolverSettings(precision="single"), blade=None),
+    "line, moved": Case(blade=None, drive=shift),
+    "line, held": Case(blade=None, drive=hold),
+    "line, touched": Case(blade=None, drive=touch),
+    "line, settled": Case(blade=None, drive=Tissue.settle),
+}
+"""More of a line that cuts."""
+
 
 def step(tissue: Tissue, sweeps: list[BladeSweep]) -> str:
     """Do some frames; return a hash of all that can be seen of the body and of each frame."""
@@ -145,6 +160,25 @@ def test_what_follows_a_state_is_the_same_each_time_that_it_is_loaded(saved):
     for _ in range(2):
         tissue.load_state(state)
         assert step(tissue, AFTER) == expected
+
+
+@pytest.mark.parametrize("case", [*CASES.values(), *LINES.values()], ids=[*CASES, *LINES])
+def test_from_each_instant_to_each_earlier_one_the_same_frames_follow(case):
+    """Those of the body that was never put back: before contact, in it, mid-cut, at the end."""
+    tissue, states, frames = case.make(), {}, {}
+    for i in range(len(STROKE)):
+        if i in INSTANTS:
+            states[i] = tissue.save_state()
+        if i in INSTANTS or i - 1 in INSTANTS:
+            frames[i] = step(tissue, STROKE[i : i + 1])
+        else:
+            tissue.step(STROKE[i], strokes.DT)
+    for later in reversed(INSTANTS):
+        for earlier in (each for each in INSTANTS if each <= later):
+            for instant, n_frames in ((later, 1), (earlier, 2)):
+                tissue.load_state(states[instant])
+                for i in range(instant, instant + n_frames):
+                    assert step(tissue, STROKE[i : i + 1]) == frames[i], (later, earlier, i)
 
 
 def test_a_tissue_made_alike_goes_on_from_the_bytes_of_a_state(saved):

@@ -35,7 +35,8 @@ class StateRules(NamedTuple):
     kept: frozenset[str] = frozenset()
     """Names of classes whose objects never change, or are no state."""
     derived: Mapping[str, Callable[[], Any]] = MappingProxyType({})
-    """Attributes that are made again from others, and what they are until then."""
+    """Attributes that are made again from others, and calls that return what they are until then.
+    An object that is put back does not get the old one: kernels may have changed it since."""
     own: frozenset[str] = frozenset()
     """Attributes that are no state: an object keeps its own."""
     unwritten: frozenset[str] = frozenset()
@@ -113,7 +114,7 @@ class Memento:
         self.rules = rules
         self._spares = Spares() if spares is None else spares
         self.objects: list[tuple[Any, dict[str, Any]]] = []
-        """Objects, and what their attributes were."""
+        """Objects, and what their attributes were, but for those that are derived."""
         self.lists: list[tuple[list[Any], list[Any]]] = []
         """Lists, and what was in them."""
         self.dicts: list[tuple[dict[Any, Any], dict[Any, Any]]] = []
@@ -158,11 +159,11 @@ class Memento:
             attributes = attributes_of(value)
             for name in self._kinds.own(type(value)):
                 attributes.pop(name, None)
+            for name in self._kinds.derived(type(value)):
+                attributes.pop(name, None)
             self.objects.append((value, attributes))
-            skipped = self._kinds.derived(type(value))
-            for name, part in attributes.items():
-                if name not in skipped:
-                    self._walk(part)
+            for part in attributes.values():
+                self._walk(part)
         elif kind == _LIST:
             self.lists.append((value, list(value)))
             for item in value:
@@ -176,7 +177,9 @@ class Memento:
         """Put the tree back to what it was."""
         kinds = _kinds_under(self.rules)
         for owner, attributes in self.objects:
-            set_attributes(owner, attributes, kinds.own(type(owner)))
+            # What was derived then may have gone on since: it is made again.
+            derived = {name: make() for name, make in kinds.derived(type(owner)).items()}
+            set_attributes(owner, attributes | derived, kinds.own(type(owner)))
         for each, items in self.lists:
             each[:] = items
         for table, entries in self.dicts:
@@ -213,6 +216,13 @@ def attributes_in(names: Iterable[str], kind: type) -> frozenset[str]:
     return frozenset(attribute for base, attribute in split if base in bases)
 
 
+def derived_in(rules: StateRules, kind: type) -> dict[str, Callable[[], Any]]:
+    """Return the attributes of a class that are made again, and what makes their defaults."""
+    bases = {base.__name__ for base in kind.__mro__}
+    split = [(name.split("."), make) for name, make in rules.derived.items()]
+    return {attribute: make for (base, attribute), make in split if base in bases}
+
+
 class _Kinds:
     """How objects of each class are walked, under some rules."""
 
@@ -220,7 +230,7 @@ class _Kinds:
         self._rules = rules
         self._of: dict[type, int] = {kind: _LEAF for kind in _ATOMS}
         self._own: dict[type, frozenset[str]] = {}
-        self._derived: dict[type, frozenset[str]] = {}
+        self._derived: dict[type, dict[str, Callable[[], Any]]] = {}
 
     def of(self, value: Any) -> int:
         """Return how an object is walked."""
@@ -237,11 +247,11 @@ class _Kinds:
             found = self._own[kind] = attributes_in(self._rules.own, kind)
         return found
 
-    def derived(self, kind: type) -> frozenset[str]:
-        """Return the attributes of a class that are made again from others."""
+    def derived(self, kind: type) -> dict[str, Callable[[], Any]]:
+        """Return the attributes of a class that are made again, and what makes their defaults."""
         found = self._derived.get(kind)
         if found is None:
-            found = self._derived[kind] = attributes_in(self._rules.derived, kind)
+            found = self._derived[kind] = derived_in(self._rules, kind)
         return found
 
     def _look_up(self, kind: type) -> int:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tissue.core.lazy_fields import plain_class
-from tissue.core.memento import StateRules
+from tissue.core.memento import StateRules, derived_in
 from tissue.core.memento_writing import LENGTHS, PACKED, TAILS, name_of_tuple
 from tissue.core.memory_blocks import PackedMemory, unpacked
 from tissue.core.struct_memory import memory_of
@@ -130,11 +130,8 @@ class _Reader:
         attributes = {
             each: self.value(item, now.get(each)) for each, item in node["attributes"].items()
         }
-        bases = {base.__name__ for base in type(found).__mro__}
-        for each, default in self._rules.derived.items():
-            base, attribute = each.split(".")
-            if base in bases:
-                attributes[attribute] = default()
+        for each, make in derived_in(self._rules, type(found)).items():
+            attributes[each] = make()
         self.changes.append(lambda: vars(found).update(attributes))
 
     def _make_list(self, number: int, node: dict[str, Any], live: Any) -> None:

@@ -10,6 +10,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.relaxation import (
+    FIRST_STAGE,
     NOT_FINITE,
     RELAXED,
     UNSTABLE,
@@ -122,8 +123,9 @@ class GlobalStepper:
             choice = self._find_contacts(system, increment, choice)
         if self._threads is not None:
             self._threads.join(system.context)
+        stage = FIRST_STAGE
         while True:
-            arrays = self._arrays(system, blade, choice)
+            arrays = self._arrays(system, blade, choice, stage)
             outcome = self._relax.call(arrays, edge, has_blade, dt, begin, end)
             if outcome == RELAXED:
                 break
@@ -131,7 +133,7 @@ class GlobalStepper:
                 expect_stable(choice)
             if outcome == NOT_FINITE:
                 raise not_finite()
-            blade = system.interaction.with_room(outcome, blade)
+            blade, stage = system.interaction.with_room(outcome, blade), arrays.stage
         n = choice.done
         if n > 0:
             system.find_new_loose_pieces()
@@ -180,8 +182,14 @@ class GlobalStepper:
         choice.of_contact = system.contact.added_frequency_squared + system.added_by_attachments
         return choice
 
-    def _arrays(self, system: System, blade: BladeContext, choice: StepChoice) -> Relaxation:
-        """Return the arrays as one struct; another one where an owner has replaced its own."""
+    def _arrays(
+        self, system: System, blade: BladeContext, choice: StepChoice, stage: int
+    ) -> Relaxation:
+        """Return the arrays as one struct; another one where an owner has replaced its own.
+
+        `stage`: where the increment goes on. It is given in each call: what an earlier increment,
+        or one that was rolled back, has left in the struct means nothing.
+        """
         relaxation, step = self._relaxation, system.context
         if (
             relaxation is None
@@ -189,7 +197,6 @@ class GlobalStepper:
             or relaxation.blade is not blade
             or relaxation.choice is not choice
         ):
-            stage = 0 if relaxation is None else relaxation.stage
             interaction = system.interaction
             self._relaxation = relaxation = Relaxation(
                 stage=stage,
@@ -199,6 +206,7 @@ class GlobalStepper:
                 blade=blade,
                 nodes=interaction.all_nodes(system.body),
             )
+        relaxation.stage = stage
         return relaxation
 
     def mesh_changed(self, nodes: IntArray) -> None:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from tissue.core.attributes import attributes_of, set_attributes
-from tissue.core.memento import Memento, Spares, attributes_in
+from tissue.core.memento import Memento, Spares, attributes_in, derived_in
 from tissue.loads.step_inputs import StepInputs
 from tissue.state.tissue_state import RULES
 
@@ -28,17 +28,18 @@ class StepState:
     """
 
     def __init__(self, tissue: Any, spares: Spares) -> None:
-        own = attributes_in(RULES.own, type(tissue))
-        derived = attributes_in(RULES.derived, type(tissue))
+        kind = type(tissue)
+        left_out = attributes_in(RULES.own, kind) | derived_in(RULES, kind).keys()
         now = attributes_of(tissue)
-        self._attributes = {name: value for name, value in now.items() if name not in own}
-        walked = {k: value for k, value in self._attributes.items() if k not in derived}
-        self._memento = Memento(walked, RULES, spares)
+        self._attributes = {name: value for name, value in now.items() if name not in left_out}
+        self._memento = Memento(self._attributes, RULES, spares)
 
     def restore(self, tissue: Any) -> None:
         """Put the tissue back to what it was."""
         self._memento.restore()
-        set_attributes(tissue, self._attributes, attributes_in(RULES.own, type(tissue)))
+        kind = type(tissue)
+        derived = {name: make() for name, make in derived_in(RULES, kind).items()}
+        set_attributes(tissue, self._attributes | derived, attributes_in(RULES.own, kind))
 
 
 class StepLog:
