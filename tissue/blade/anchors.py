@@ -11,7 +11,7 @@ import numpy as np
 
 from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
-from tissue.blade.toughness import ToughnessLaw, toughness_at
+from tissue.blade.toughness import ToughnessLaw, skin_toughness_at, toughness_at
 from tissue.blade.walls import Walls, new_walls
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
@@ -206,7 +206,7 @@ def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area as it is now at which anchor `k` slips [J/m2]."""
     share: float = anchors.rest_share[k]
     if anchors.at_skin[k]:
-        return share * law.skin_toughness
+        return share * skin_toughness_at(law, anchors.speed[k])
     return share * toughness_at(law, anchors.speed[k])
 
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.edge import BladePose
-from tissue.blade.toughness import ToughnessLaw
+from tissue.blade.edge import BladePose, Edge, pose_at
+from tissue.blade.toughness import ToughnessLaw, skin_toughness_at, toughness_at
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
@@ -105,6 +105,9 @@ class BluntContacts(Arrays):
     shape (n, 2)."""
     energy: FloatArray
     """Energy stored in the sample when slip was applied last [J], shape (n,)."""
+    speed: FloatArray
+    """Speed at which the tip's end moves outward in this step [m/s], shape (n,); 0 of other
+    sides. It decides the toughness, as that of the edge does."""
 
 
 class BluntSide(NamedTuple):
@@ -223,7 +226,19 @@ def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> BluntCont
         rest=np.zeros((n, 3)),
         held=np.zeros((n, 2)),
         energy=np.zeros(n),
+        speed=np.zeros(n),
     )
+
+
+@kernel
+def measure_tip_speeds(blunt: BluntContacts, edge: Edge, dt: float) -> None:
+    """Write the outward speed of each sample of the tip's end in a time step of `dt` [s]."""
+    before, after = pose_at(edge, 0.0), pose_at(edge, 1.0)
+    along = pose_at(edge, 0.5).along
+    for k in range(len(blunt.state)):
+        if blunt.side[k] == TIP_END:
+            moved = sub(blunt_side(blunt, after, k).at, blunt_side(blunt, before, k).at)
+            blunt.speed[k] = max(-dot(moved, along), 0.0) / dt if dt > 0.0 else 0.0
 
 
 @kernel
@@ -283,9 +298,16 @@ def press_of(
 @kernel
 def piercing_depth(blunt: BluntContacts, k: int, law: ToughnessLaw) -> float:
     """Return the depth at which sample `k` of the tip's end pierces [m]."""
-    toughness = law.toughness if blunt.state[k] == PIERCING else law.skin_toughness
-    depth: float = toughness * blunt.length[k] / blunt.stiffness[k]
+    depth: float = tip_toughness(blunt, k, law) * blunt.length[k] / blunt.stiffness[k]
     return depth
+
+
+@kernel
+def tip_toughness(blunt: BluntContacts, k: int, law: ToughnessLaw) -> float:
+    """Return the energy per area at which sample `k` of the tip's end pierces [J/m2]."""
+    if blunt.state[k] == PIERCING:
+        return toughness_at(law, blunt.speed[k])
+    return skin_toughness_at(law, blunt.speed[k])
 
 
 @kernel

@@ -11,6 +11,7 @@ from tissue.blade.blunt_contact import (
     press_energy,
     press_force,
     press_of,
+    tip_toughness,
     touched_point,
 )
 from tissue.blade.blunt_search import move_point
@@ -135,7 +136,7 @@ def _pierce(
     again = press_of(blunt, k, side, normal, p, law)
     is_inside = _move_by(blade, body, visits, k, scale(again.surplus, side.outward))
     moved = sub(touched_point(blunt, body, body.positions, k), p)
-    cost = law.toughness * blunt.length[k] * max(dot(moved, side.outward), 0.0)
+    cost = tip_toughness(blunt, k, law) * blunt.length[k] * max(dot(moved, side.outward), 0.0)
     left = 0.0
     if is_inside:
         q = touched_point(blunt, body, body.positions, k)

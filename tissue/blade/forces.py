@@ -8,7 +8,7 @@ from tissue.blade.anchors import (
     measure_speeds,
 )
 from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import blunt_energy
+from tissue.blade.blunt_contact import blunt_energy, measure_tip_speeds
 from tissue.blade.blunt_forces import (
     add_blunt_stiffness,
     apply_blunt_forces,
@@ -32,6 +32,15 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
+
+
+@kernel
+def edge_energy(blade: BladeState, body: Body, edge: Edge, when: float) -> float:
+    """Return the energy stored in the edge and the blunt sides at an instant of a time step [J]."""
+    pose, law = pose_at(edge, when), blade.toughness
+    return anchors_energy(blade.anchors, body, pose, law) + blunt_energy(
+        blade.blunt, body, pose, law
+    )
 
 
 @kernel
@@ -59,11 +68,11 @@ def begin_blade_step(
     if blade.toughness.exponent == 0.0:  # then speed does not change the energy
         measure_speeds(anchors, edge, dt)
         return True
-    pose = pose_at(edge, 0.0)
-    before = anchors_energy(anchors, body, pose, blade.toughness)
+    before = edge_energy(blade, body, edge, 0.0)
     measure_speeds(anchors, edge, dt)
+    measure_tip_speeds(blade.blunt, edge, dt)
     # A slower edge has a lower yield limit: the energy beyond it is spent on the next slip.
-    after = anchors_energy(anchors, body, pose, blade.toughness)
+    after = edge_energy(blade, body, edge, 0.0)
     blade.totals.work_of_breaking += before - after
     return True
 
@@ -132,15 +141,6 @@ def apply_slip(
     slip_anchors(blade, body, visits, pose, seconds)
     apply_sliding(blade, pose, body.positions, seconds)
     slip_blunt_sides(blade, body, visits, pose)
-
-
-@kernel
-def edge_energy(blade: BladeState, body: Body, edge: Edge, when: float) -> float:
-    """Return the energy stored in the edge and the blunt sides at an instant of a time step [J]."""
-    pose, law = pose_at(edge, when), blade.toughness
-    return anchors_energy(blade.anchors, body, pose, law) + blunt_energy(
-        blade.blunt, body, pose, law
-    )
 
 
 @kernel

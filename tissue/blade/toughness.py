@@ -12,7 +12,7 @@ class ToughnessLaw(Arrays):
     toughness: float
     """Energy per area of a slow cut [J/m2]."""
     skin_toughness: float
-    """Energy per area until the edge has broken the skin [J/m2]."""
+    """Energy per area until the edge has broken the skin, in a slow cut [J/m2]."""
     exponent: float
     """Exponent of the dependence on speed; 0 for none."""
     doubling_speed: float
@@ -42,3 +42,12 @@ def toughness_at(law: ToughnessLaw, speed: float) -> float:
         return law.toughness
     more: float = (speed / law.doubling_speed) ** law.exponent
     return law.toughness * (1.0 + more)
+
+
+@kernel
+def skin_toughness_at(law: ToughnessLaw, speed: float) -> float:
+    """Return the energy per area of breaking the skin at that speed [m/s]: [J/m2].
+
+    It is that of the skin, or that of the tissue at this speed where that is more.
+    """
+    return max(law.skin_toughness, toughness_at(law, speed))

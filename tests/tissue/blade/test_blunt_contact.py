@@ -18,6 +18,7 @@ from tissue.blade.blunt_contact import (
     TIP_END,
     blunt_side,
     fit_stiffness,
+    measure_tip_speeds,
     new_blunt_contacts,
     press_energy,
     press_force,
@@ -185,6 +186,25 @@ def test_the_tip_holds_up_to_the_toughness_of_the_skin_then_pierces_at_that_of_t
     assert totals.work_of_cutting == pytest.approx(20.0 * length * (1.01 * limit - limit / 1.5))
     spent = totals.work_of_cutting + totals.work_of_breaking
     assert spent == pytest.approx(before - held.energy(edge))
+
+
+def test_a_faster_tip_pierces_at_a_higher_toughness():
+    law = Material(toughness=20.0, skin_toughness=30.0, toughness_exponent=1.0, toughness_speed=0.1)
+    held = PressingBlade(TIP_END, law)
+    length, stiffness = held.blunt.length[held.k], held.blunt.stiffness[held.k]
+    deep = edge_of(TIP_END, 60.0 * length / stiffness)
+    at_first = edge_of(TIP_END, 60.0 * length / stiffness - 1e-4)
+    edge = Edge(
+        *(at_first.tip_t0, at_first.heel_t0, at_first.forward_t0),
+        *(deep.tip_t1, deep.heel_t1, deep.forward_t1),
+    )
+    measure_tip_speeds(held.blunt, edge, 1e-3)  # 0.1 mm in 1 ms
+    np.testing.assert_allclose(held.blunt.speed[held.blunt.side == TIP_END], 0.1)
+    assert not held.blunt.speed[held.blunt.side != TIP_END].any()
+    held.slip(edge)
+    assert held.force(edge).z == pytest.approx(-40.0 * length)
+    totals = held.blade.totals
+    assert totals.work_of_cutting == pytest.approx(40.0 * length * 20.0 * length / stiffness)
 
 
 def test_the_rows_of_stiffness_add_up_to_that_of_the_samples_that_press():
