@@ -8,6 +8,7 @@ import numpy as np
 
 from bridge import Fixture, InProcessLink, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
+from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.arm.geom_coupling import GeomCoupling
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.scene_arms import ArmSurroundings, own_arm_in, project_arm_in
@@ -56,6 +57,7 @@ def prepare(
         ValueError: parts of the scene do not fit together; the message says which.
         LinkError: the body is elsewhere, and cannot be reached.
     """
+    fixtures = list(fixtures)
     if link is None:
         link = InProcessLink(make_tissue(scene), scene.name)
     body, tissue = link.snapshot(), link.describe()
@@ -72,7 +74,10 @@ def prepare(
     if not stroke.is_led:
         _warn_of_table(stroke, table)
     boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
-    floor = [] if tissue.floor is None else [floor_below(bounds, tissue.floor)]
+    floor = []
+    if tissue.floor is not None:
+        name = free_name("floor", [fixture.name for fixture in fixtures])
+        floor.append(floor_below(bounds, tissue.floor, name))
     around = ArmSurroundings(boxes, table, [*fixtures, *floor])
     if scene.own_arm is None:
         stands = project_arm_in(scene, stroke, motions, around, needed)
@@ -92,7 +97,7 @@ def prepare(
     )
     simulation.workspace = stands.room
     if scene.graspers:
-        _add_graspers(simulation, scene.graspers, motions, [each.body for each in standing])
+        _add_graspers(simulation, scene.graspers, motions)
     return simulation
 
 
@@ -100,7 +105,6 @@ def _add_graspers(
     simulation: Simulation,
     graspers: Sequence[GrasperTable],
     motions: Sequence[GraspMotion],
-    fixtures: Sequence[str],
 ) -> None:
     """Have graspers take part, and all bodies of the arms but the blade touch the tissue.
 
@@ -108,11 +112,13 @@ def _add_graspers(
         simulation: Before its first frame.
         graspers: What the scene says of them.
         motions: Where they go.
-        fixtures: Names of bodies that the tissue knows already.
     """
     arm, bridge = simulation.arm, simulation.bridge
-    ours = [arm.model.body(arm.blade.body_id).name, *fixtures]
-    simulation.partners.append(GeomCoupling(arm.data, bridge, without=ours))
+    known: list[str | int] = [
+        arm.blade.body_id,
+        *arm.fixtures.values(),
+    ]  # the tissue has them already
+    simulation.partners.append(GeomCoupling(arm.data, bridge, without=known))
     for grasper in led_graspers(graspers, motions, arm, bridge):
         simulation.add_grasper(grasper)
 

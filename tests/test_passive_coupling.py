@@ -14,7 +14,6 @@ from bridge import Bridge, VirtualCoupling
 from bridge.counters import Counters
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.arm.arm import Arm
-from scalpel_sim.arm.hand import ACTUATORS
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.validate.coupling import work_on_tissue
@@ -108,9 +107,8 @@ def shifted(segment: BladeSegment, displacement: float) -> BladeSegment:
 
 def release(arm: Arm) -> None:
     """Switch off the actuators of the hand."""
-    for name in ACTUATORS:
-        arm.model.actuator(name).gainprm[:] = 0.0
-        arm.model.actuator(name).biasprm[:] = 0.0
+    arm.model.actuator_gainprm[arm.hand.actuators] = 0.0
+    arm.model.actuator_biasprm[arm.hand.actuators] = 0.0
 
 
 def kinetic_energy(arm: Arm) -> float:

@@ -1,11 +1,12 @@
 """The geoms of a MuJoCo arm as parts for the collision library, and its tables."""
 
+from collections.abc import Collection
+
 import mujoco
 import numpy as np
 
 from bridge import ArmGeom, FixtureBox, GeomShape
 from scalpel_sim.arm.joint_reach import JointReach, hinge_displacement
-from scalpel_sim.arm.standing_fixture import PREFIX
 from tissue import FloatArray, IntArray, SameTypes, kernel
 
 _SHAPES: dict[int, tuple[GeomShape, int]] = {
@@ -34,9 +35,16 @@ class ArmParts:
         model: A compiled model.
         data: Its data, seen live.
         blade: Number of the body that carries the blade.
+        fixtures: Numbers of bodies that are no part of an arm.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, blade: int) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        blade: int,
+        fixtures: Collection[int] = (),
+    ) -> None:
         instrument = instrument_body(model, blade)
         n_joints = _joints_up(model, instrument)
         self._geoms = [
@@ -45,7 +53,7 @@ class ArmParts:
             if int(model.geom_type[i]) in _SHAPES
             and int(model.geom_bodyid[i]) != WORLD
             and model.body_mocapid[model.geom_bodyid[i]] < 0  # the hand is no solid body
-            and not model.body(int(model.geom_bodyid[i])).name.startswith(PREFIX)  # no part of arms
+            and int(model.geom_bodyid[i]) not in fixtures
         ]
         self.parts = []
         self.names = [_name(model, i) for i in range(model.ngeom)]
@@ -124,14 +132,17 @@ def _remain_within(
     return True
 
 
-def arms_of_geoms(model: mujoco.MjModel) -> IntArray:
+def arms_of_geoms(model: mujoco.MjModel, fixtures: Collection[int]) -> IntArray:
     """Return for each geom the body of the world that carries it; `WORLD` for what is no arm.
 
     Arms are told apart by it: each stands on one body of the world.
+
+    Args:
+        model: A compiled model.
+        fixtures: Numbers of bodies that are no part of an arm.
     """
     roots = model.body_rootid[model.geom_bodyid].astype(np.int64)
-    no_arm = [model.body(int(root)).name.startswith(PREFIX) for root in roots]
-    return np.where(no_arm, WORLD, roots)
+    return np.where(np.isin(roots, list(fixtures)), WORLD, roots)
 
 
 def instrument_body(model: mujoco.MjModel, blade: int) -> int:
@@ -142,12 +153,12 @@ def instrument_body(model: mujoco.MjModel, blade: int) -> int:
     return body
 
 
-def tables(model: mujoco.MjModel) -> list[FixtureBox]:
-    """Return the planes that lie in the world, as boxes below them.
+def tables(model: mujoco.MjModel) -> dict[int, FixtureBox]:
+    """Return the planes that lie in the world, as boxes below them, by MuJoCo's numbers.
 
     A plane without an end is left out: so is what it is for, a horizon to look at.
     """
-    found = []
+    found = {}
     for i in range(model.ngeom):
         x, y, _ = model.geom_size[i].tolist()
         is_plane = int(model.geom_type[i]) == int(mujoco.mjtGeom.mjGEOM_PLANE)
@@ -155,13 +166,11 @@ def tables(model: mujoco.MjModel) -> list[FixtureBox]:
             matrix = np.empty(9)
             mujoco.mju_quat2Mat(matrix, model.geom_quat[i])
             turned = matrix.reshape(3, 3)
-            found.append(
-                FixtureBox(
-                    model.geom(i).name or f"plane {i}",
-                    np.array([2.0 * x, 2.0 * y, TABLE_THICKNESS]),
-                    model.geom_pos[i] - 0.5 * TABLE_THICKNESS * turned[:, 2],
-                    turned,
-                )
+            found[i] = FixtureBox(
+                model.geom(i).name or f"plane {i}",
+                np.array([2.0 * x, 2.0 * y, TABLE_THICKNESS]),
+                model.geom_pos[i] - 0.5 * TABLE_THICKNESS * turned[:, 2],
+                turned,
             )
     return found
 

@@ -3,8 +3,8 @@
 import logging
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
-import mujoco
 import numpy as np
 
 from bridge import Collisions, Fixture, FixtureBox
@@ -17,7 +17,6 @@ from scalpel_sim.arm.collision_geoms import (
 )
 from scalpel_sim.arm.collision_groups import collide
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.standing_fixture import PREFIX
 from tissue import FloatArray, IntArray
 
 FLOOR_MARGIN = 0.02
@@ -63,11 +62,27 @@ class CollisionMonitor:
     """
 
     def __init__(self, arm: LedArm, fixtures: Iterable[Fixture] = ()) -> None:
+        model, fixtures = arm.model, list(fixtures)
+        bodies = {name: model.body(body).id for name, body in arm.fixtures.items()}
         self._arm = arm
-        self._parts = ArmParts(arm.model, arm.data, arm.blade.body_id)
-        self._collisions = Collisions(self._parts.parts, [*tables(arm.model), *fixtures])
+        self._parts = ArmParts(model, arm.data, arm.blade.body_id, bodies.values())
+        self._geom_of = {
+            name: int(model.body_geomadr[body])
+            for name, body in bodies.items()
+            if model.body_geomnum[body]
+        }
+        """A geom of each fixture and plane that stands in the model, by its name in reports."""
+        planes, taken = [], {fixture.name for fixture in fixtures}
+        for geom, plane in tables(model).items():
+            name = plane.name
+            while name in taken:  # a plane of a user's model may be called as a fixture is
+                name = f"{name} of the model"
+            taken.add(name)
+            planes.append(replace(plane, name=name))
+            self._geom_of[name] = geom
+        self._collisions = Collisions(self._parts.parts, [*planes, *fixtures])
         self._data = arm.data
-        self._arm_of = arms_of_geoms(arm.model)
+        self._arm_of = arms_of_geoms(model, bodies.values())
         self._has_two = len(set(self._arm_of.tolist()) - {WORLD}) > 1
         self._free_way = 0.0
         self._has_passed = False
@@ -128,21 +143,18 @@ class CollisionMonitor:
         geom = numbers[part]
         if other in numbers:
             return collide(model, geom, numbers[other])
-        for name in (PREFIX + other, f"{PREFIX}{other}_0", other):
-            number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-            if number >= 0:
-                return collide(model, geom, number)
-        return False
+        return other in self._geom_of and collide(model, geom, self._geom_of[other])
 
 
-def floor_below(bounds: FloatArray, height: float) -> FixtureBox:
+def floor_below(bounds: FloatArray, height: float, name: str = "floor") -> FixtureBox:
     """Return the floor that loose pieces land on, as far as it is below the body. Tissue frame.
 
     Args:
         bounds: Lowest and highest corner of the body [m], shape (2, 3).
         height: Height of the upper side of the floor [m].
+        name: What it is called.
     """
     low, high = bounds[:, :2]
     centre = np.array([*(0.5 * (low + high)), height - 0.5 * TABLE_THICKNESS])
     size = np.array([*(high - low + 2.0 * FLOOR_MARGIN), TABLE_THICKNESS])
-    return FixtureBox("floor", size, centre)
+    return FixtureBox(name, size, centre)

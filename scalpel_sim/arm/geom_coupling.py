@@ -56,8 +56,8 @@ class GeomCoupling:
         tissue: What they touch: a tissue in this process, or a bridge to one anywhere.
         bodies: Names of bodies whose geoms take part; of each those that MuJoCo lets collide, or
             all of its geoms where it lets none. None: all bodies but `without`.
-        without: Names of bodies that take no part where `bodies` is None: that of the blade, which
-            the tissue knows already.
+        without: Names or numbers of bodies that take no part where `bodies` is None: that of the
+            blade, which the tissue knows already.
         frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
 
     Raises:
@@ -72,17 +72,17 @@ class GeomCoupling:
         tissue: Tissue | Bridge,
         bodies: Sequence[str] | None = None,
         *,
-        without: Sequence[str] = (),
+        without: Sequence[str | int] = (),
         frame: TissueFrame = TissueFrame(),
     ) -> None:
         model: mujoco.MjModel = data.model
         self._data, self._frame = data, frame_of(tissue, frame)
         if bodies is None:
-            left_out = {body_number(model, name, GeomCouplingError) for name in without}
+            left_out = {_number(model, body) for body in without}
             chosen = [i for i in range(model.nbody) if i not in left_out]
             chosen = [i for i in chosen if int(model.body_mocapid[i]) < 0]  # a hand is not solid
         else:
-            chosen = [body_number(model, name, GeomCouplingError) for name in bodies]
+            chosen = [_number(model, name) for name in bodies]
         found = {body: _geoms_of_body(model, body) for body in chosen}
         if bodies is not None:
             for body, ids in found.items():
@@ -127,18 +127,16 @@ class GeomCoupling:
         self._data.xfrc_applied += now - self._of_tissue
         self._of_tissue = now
 
-    def wrench(self, body: str) -> Wrench:
+    def wrench(self, body: str | int) -> Wrench:
         """Return the wrench of the tissue on a body in the last step, about its origin, world.
+
+        Args:
+            body: Its name or number.
 
         Raises:
             GeomCouplingError: the model has no such body.
         """
-        number = (
-            body_number(self._data.model, body, GeomCouplingError)
-            if isinstance(body, str)
-            else body
-        )
-        return self._wrench_on(number, self._contact.loads)
+        return self._wrench_on(_number(self._data.model, body), self._contact.loads)
 
     def forces(self) -> GeomForceList:
         """Return where tissue touched geoms in the last step, and how it pushed them."""
@@ -166,6 +164,11 @@ class GeomCoupling:
         places = self._data.geom_xpos[self.geom_ids]
         axes = self._data.geom_xmat[self.geom_ids].reshape(-1, 3, 3)
         return GeomPoses(self._frame.points_to_tissue(places), self._frame.rotation.T @ axes)
+
+
+def _number(model: mujoco.MjModel, body: str | int) -> int:
+    """Return MuJoCo's number of a body that is given by its name or number."""
+    return body_number(model, body, GeomCouplingError) if isinstance(body, str) else body
 
 
 def _geoms_of_body(model: mujoco.MjModel, body: int) -> list[int]:

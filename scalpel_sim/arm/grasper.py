@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from scalpel_sim.arm.free_names import free_prefix, names_in
 from scalpel_sim.arm.hand import Hand
 from scalpel_sim.arm.model_options import take_options
 from tissue import BladeSegment, FloatArray, Wrench
@@ -13,10 +14,13 @@ from tissue import BladeSegment, FloatArray, Wrench
 _FILE = Path(__file__).parent / "assets" / "grasper.xml"
 
 GRASPER = "grasper_"
-"""What the names of its bodies, geoms, sites and joints begin with in the model of its arm."""
+"""What the names of its parts begin with in the model of its arm, where those are free."""
 
-GRASPER_HEEL, GRASPER_TIP = f"{GRASPER}heel", f"{GRASPER}tip"
-"""Sites where the pads begin and end: a hand holds the grasper half way between them."""
+PADS_HEEL, PADS_TIP = "heel", "tip"
+"""Sites where the pads begin and end, after that prefix: a hand holds it half way between them."""
+
+_JAWS = ("jaw_low", "jaw_high")
+"""Joints of its jaws, and their bodies."""
 
 SHAFT_LENGTH = 0.0715
 """From where an arm holds it to the middle of the pads [m]."""
@@ -31,7 +35,7 @@ FORWARD = (0.0, 0.0, -1.0)
 """What a blade calls forward, in the frame of the shaft: across the shaft and across the way of the
 jaws. A grasper is led as a blade is."""
 
-_PARTS = ("shaft", "jaw_low", "jaw_high")
+_PARTS = ("shaft", *_JAWS)
 """Its bodies."""
 
 _ALONG_FLANGE = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
@@ -53,15 +57,19 @@ class Pads(NamedTuple):
     """Half the opening, half the length of a pad, half its width [m], shape (3,)."""
 
 
-def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> None:
+def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> str:
     """Have a body or a site of a model hold a grasper, whose shaft points along its +z.
 
-    That is how the flanges of robots point. The actuator `grasper_jaws` opens the jaws [m].
+    That is how the flanges of robots point. The actuator `grasper_jaws` opens the jaws [m]; where
+    the model has one of the names of its parts, all of them get another prefix.
 
     Args:
         spec: A model that is yet to be compiled.
         at: Name of a site, or of a body, at whose origin the shaft begins.
         force: Largest force of the jaws [N]; None: that of `grasper.xml`.
+
+    Returns:
+        The prefix of the names of its parts, for `Grasper`: `grasper_` where all are free.
 
     Raises:
         GrasperError: the model has no such site or body.
@@ -75,10 +83,12 @@ def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> 
         )
     grasper = grasper_spec(spec, force)
     grasper.body("shaft").quat = _ALONG_FLANGE
+    prefix = free_prefix(spec, names_in(grasper), GRASPER)
     if site is None:
-        spec.attach(grasper, prefix=GRASPER, frame=body.add_frame())
+        spec.attach(grasper, prefix=prefix, frame=body.add_frame())
     else:
-        spec.attach(grasper, prefix=GRASPER, site=site)
+        spec.attach(grasper, prefix=prefix, site=site)
+    return prefix
 
 
 def grasper_spec(spec: mujoco.MjSpec, force: float | None = None) -> mujoco.MjSpec:
@@ -103,23 +113,22 @@ class Grasper:
     Args:
         model: The model.
         data: Its data.
-        prefix: What the names of its arm begin with.
+        prefix: What the names of its parts begin with: what `add_grasper` returned.
 
     Raises:
         KeyError: the model has no such grasper.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = "") -> None:
-        name = prefix + GRASPER
-        self.body = f"{name}shaft"
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = GRASPER) -> None:
+        self.body = f"{prefix}shaft"
         """Name of the body that carries shaft and jaws."""
-        self.bodies = tuple(name + part for part in _PARTS)
+        self.bodies = tuple(prefix + part for part in _PARTS)
         """Names of all its bodies."""
         bodies = [model.body(body).id for body in self.bodies]
-        pinch = model.site(f"{name}pinch").id
-        joints = [model.joint(f"{name}jaw_{side}") for side in ("low", "high")]
-        servo = int(model.actuator_ctrladr[model.actuator(f"{name}jaws").id])
-        _, length, width = model.geom(f"{name}pad_low").size
+        pinch = model.site(f"{prefix}pinch").id
+        joints = [model.joint(prefix + jaw) for jaw in _JAWS]
+        servo = int(model.actuator_ctrladr[model.actuator(f"{prefix}jaws").id])
+        _, length, width = model.geom(f"{prefix}pad_low").size
         self._half_pad = float(length), float(width)
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._jaws = [data.qpos[joint.qposadr[0] : joint.qposadr[0] + 1] for joint in joints]
@@ -137,6 +146,11 @@ class Grasper:
     def open_to(self, opening: float) -> None:
         """Have the jaws open or close to a distance between the pads [m], with limited force."""
         self._control[0] = opening
+
+    def put_to(self, opening: float) -> None:
+        """Put the jaws, at once, where the distance between the pads is that [m]."""
+        for jaw in self._jaws:
+            jaw[0] = 0.5 * opening
 
     @property
     def pads(self) -> Pads:
@@ -163,15 +177,22 @@ class GuidedGrasper(Grasper):
     Args:
         model: The model.
         data: Its data.
-        prefix: What the names of its arm begin with.
+        prefix: See `Grasper`.
+        of_hand: What the names of its hand begin with: what `hand.add_hand` returned.
 
     Raises:
         KeyError: the model has no such grasper, or no hand that leads it.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = "") -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        prefix: str = GRASPER,
+        of_hand: str = "",
+    ) -> None:
         super().__init__(model, data, prefix)
-        self.hand = Hand(model, data, prefix)
+        self.hand = Hand(model, data, of_hand)
 
     def hold(self) -> None:
         """Lead it to rest where it is, as far open as it is: where a motion begins."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from scalpel_sim.arm.free_names import free_prefix
 from scalpel_sim.quaternions import (
     Matrix,
     Vector,
@@ -18,11 +19,18 @@ from scalpel_sim.quaternions import (
 )
 from tissue import BladeSegment, FloatArray, kernel
 
-HAND = "hand"
+_HAND = "hand"
 """Name of the body that shows where the hand wants the middle of the edge, and of its site."""
-EDGE = "edge"
+_EDGE = "edge"
 """Name of the site in the middle of the edge, where the hand holds the blade."""
-ACTUATORS = ("hand_x", "hand_y", "hand_z", "hand_turn")
+_ACTUATORS = ("hand_x", "hand_y", "hand_z", "hand_turn")
+_NAMES = {
+    "bodies": [_HAND],
+    "geoms": [_HAND],
+    "sites": [_HAND, _EDGE],
+    "actuators": _ACTUATORS,
+}
+"""Names of what a hand adds to a model, after a prefix with which they are free."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +69,10 @@ def add_hand(
     heel: str = "heel",
     tip: str = "tip",
     forward: Sequence[float] = (0.0, 0.0, -1.0),
-) -> None:
+) -> str:
     """Add a hand that holds the blade between two sites of a model that is yet to be compiled.
 
-    Afterwards `Hand(model, data)` moves it.
+    Afterwards `Hand(model, data, prefix)` moves it.
 
     Args:
         spec: Has the two sites, on one body. It gains a mocap body, two sites and four actuators,
@@ -73,6 +81,9 @@ def add_hand(
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
+
+    Returns:
+        The prefix of its names: empty where the model has none of them itself.
 
     Raises:
         ValueError: the model has no such site.
@@ -84,11 +95,13 @@ def add_hand(
     ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
     along = tuple((ends[1] - ends[0]).tolist())
     quaternion = quaternion_of(_axes(along, _numbers(np.array(forward, np.float64))))
-    spec.site(tip).parent.add_site(name=EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=quaternion)
-    hand = spec.worldbody.add_body(name=HAND, mocap=True)
-    hand.add_site(name=HAND)
+    prefix = free_prefix(spec, _NAMES)
+    edge, name = prefix + _EDGE, prefix + _HAND
+    spec.site(tip).parent.add_site(name=edge, pos=(ends[0] + ends[1]) / 2.0, quat=quaternion)
+    hand = spec.worldbody.add_body(name=name, mocap=True)
+    hand.add_site(name=name)
     hand.add_geom(
-        name=HAND,
+        name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[0.003, 0.0, 0.0],
         rgba=[1.0, 0.6, 0.2, 0.5],
@@ -96,16 +109,21 @@ def add_hand(
         conaffinity=0,
         group=3,  # hidden unless asked for
     )
-    for axis, name in enumerate(ACTUATORS[:3]):
-        spring = _actuator(spec, name)
+    *springs, turn = (
+        # Each acts on the middle of the edge as seen from the hand.
+        spec.add_actuator(
+            name=prefix + each, trntype=mujoco.mjtTrn.mjTRN_SITE, target=edge, refsite=name
+        )
+        for each in _ACTUATORS
+    )
+    for axis, spring in enumerate(springs):
         spring.gear = np.eye(6)[axis]
         spring.gainprm[0] = impedance.stiffness
         spring.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         spring.biasprm[:3] = 0.0, -impedance.stiffness, -impedance.damping
-    _actuator(spec, ACTUATORS[3]).set_to_orientation(
-        impedance.rotational_stiffness, impedance.rotational_damping
-    )
+    turn.set_to_orientation(impedance.rotational_stiffness, impedance.rotational_damping)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    return prefix
 
 
 class HandCommand(NamedTuple):
@@ -128,23 +146,26 @@ class Hand:
     Args:
         model: A compiled model.
         data: Its data.
-        prefix: What the names of its arm begin with.
+        prefix: What its names begin with: what `add_hand` returned, after that of its arm.
 
     Raises:
         KeyError: the model has no hand.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = "") -> None:
-        mocap = int(model.body(prefix + HAND).mocapid[0])
-        first = model.actuator(prefix + ACTUATORS[0]).id
+        mocap = int(model.body(prefix + _HAND).mocapid[0])
+        self.actuators = [model.actuator(prefix + name).id for name in _ACTUATORS]
+        """MuJoCo's numbers of its actuators: three move the edge, one turns it."""
+        self.edge = model.site(prefix + _EDGE).id
+        """MuJoCo's number of the site in the middle of the edge."""
+        first, turn = self.actuators[0], self.actuators[3]
         controls = int(model.actuator_ctrladr[first])
         outputs = int(model.actuator_outadr[first])
         self._position = data.mocap_pos[mocap]
         self._quaternion = data.mocap_quat[mocap]
         self._control = data.ctrl[controls : controls + 6]
         self._output = data.actuator_force[outputs : outputs + 6]
-        self._edge = data.site_xpos[model.site(prefix + EDGE).id]
-        turn = model.actuator(prefix + ACTUATORS[3]).id
+        self._edge = data.site_xpos[self.edge]
         bias, dt = model.actuator_biasprm, model.opt.timestep
         of_motion, of_turning = (bias[i, 2] / bias[i, 1] / dt for i in (first, turn))
         self.command = HandCommand(
@@ -188,11 +209,6 @@ class Hand:
         force = np.empty(3)
         mujoco.mju_rotVecQuat(force, self._output[:3], self._quaternion)
         return force
-
-
-def _actuator(spec: mujoco.MjSpec, name: str) -> "mujoco.MjsActuator":
-    """Add an actuator that acts on the middle of the edge as seen from the hand."""
-    return spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=EDGE, refsite=HAND)
 
 
 def _numbers(vector: FloatArray) -> Vector:

@@ -15,6 +15,7 @@ from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.mujoco_warnings import route_warnings
 from scalpel_sim.arm.standing import Standing
+from scalpel_sim.arm.standing_fixture import StandingFixture
 from tissue import FloatArray
 
 LARGEST_JOINT_STEP = 0.5
@@ -44,7 +45,7 @@ class LedArm:
             grasper, a table, fixtures. Contact is on for them where the model has it off.
 
     Raises:
-        ValueError: the model has no such sites, or cannot be compiled.
+        ValueError: the model has no such sites, or cannot be compiled; two fixtures have one name.
     """
 
     def __init__(
@@ -60,13 +61,22 @@ class LedArm:
         others: Sequence[Standing] = (),
     ) -> None:
         route_warnings()
-        add_hand(spec, impedance, heel, tip, forward)
+        hand = add_hand(spec, impedance, heel, tip, forward)
         self._n_own = len(spec.joints)
         collide_as_one_arm(spec, spec)
         if others:
             spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        self.fixtures: dict[str, str] = {}
+        """Names of the bodies of fixtures in its model, by those of the fixtures."""
+        held: list[tuple[HeldArm, str]] = []
         for other in others:
-            other.stand_in(spec)
+            called = other.stand_in(spec)
+            if isinstance(other, StandingFixture):
+                if other.fixture.name in self.fixtures:
+                    raise ValueError(f"two fixtures have the name {other.fixture.name!r}")
+                self.fixtures[other.fixture.name] = called
+            elif isinstance(other, HeldArm):
+                held.append((other, called))
         self.name = name
         """Name of the arm, for reports."""
         self.limits = limits
@@ -75,10 +85,12 @@ class LedArm:
         self.data = mujoco.MjData(self.model)
         """MuJoCo's data."""
         self.blade = Blade(self.model, self.data, heel, tip, forward=forward)
-        self.hand = Hand(self.model, self.data)
-        self.others = tuple(each for each in others if isinstance(each, HeldArm))
+        self.hand = Hand(self.model, self.data, hand)
+        self.others = tuple(other for other, _ in held)
         """Arms that stand in its world."""
-        self.graspers = tuple(other.grasper(self.model, self.data) for other in self.others)
+        self.graspers = tuple(
+            other.grasper(self.model, self.data, prefix) for other, prefix in held
+        )
         """What these hold."""
         self.joints = tuple(
             self.model.joint(i).name or f"joint {i}" for i in range(self.model.njnt)

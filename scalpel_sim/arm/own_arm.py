@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
-from scalpel_sim.arm.hand import EDGE, Impedance
+from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.arm.reachable_box import grown_within, placed_within, shrunk, tour_of
@@ -126,9 +126,8 @@ def firm_impedance(arm: LedArm) -> Impedance:
         arm: The arm, alone in its model, in a configuration in which it will work.
     """
     model, data = arm.model, arm.data
-    site = model.site(EDGE).id
     position, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-    mujoco.mj_jacSite(model, data, position, rotation, site)
+    mujoco.mj_jacSite(model, data, position, rotation, arm.hand.edge)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
     mass, moment = (_felt(jacobian, inertia) for jacobian in (position, rotation))
@@ -221,7 +220,7 @@ class _InverseKinematics:
         self._model = arm.model
         self._data = mujoco.MjData(arm.model)
         self._low, self._high = arm.ranges()
-        self._site = arm.model.site(EDGE).id
+        self._site = arm.hand.edge
         self._at_first = np.array(arm.data.qpos)
 
     def starts(self) -> list[FloatArray]:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -13,10 +12,11 @@ from scalpel_sim.arm.arm import preset_spec, put_base
 from scalpel_sim.arm.grasper import (
     FORWARD,
     GRASPER,
-    GRASPER_HEEL,
-    GRASPER_TIP,
     HALF_PAD,
+    PADS_HEEL,
+    PADS_TIP,
     SHAFT_LENGTH,
+    Grasper,
     add_grasper,
     grasper_spec,
 )
@@ -69,10 +69,11 @@ def preset_with_grasper(
     place = stylus.add_frame(pos=blade.pos, quat=[math.cos(half), math.sin(half), 0.0, 0.0])
     spec.delete(blade)
     spec.attach(grasper_spec(spec, force), prefix=GRASPER, frame=place)
-    add_hand(spec, Impedance(), GRASPER_HEEL, GRASPER_TIP, FORWARD)
+    hand = add_hand(spec, Impedance(), GRASPER + PADS_HEEL, GRASPER + PADS_TIP, FORWARD)
     qpos = np.append(placement.qpos, 2 * [0.5 * motion.opening(0.0)])
     origin = frame.points_to_world(-placement.tissue_origin)
-    return HeldArm(motion.name, spec, qpos, origin, _quaternion(frame.rotation), workspace)
+    turned = _quaternion(frame.rotation)
+    return HeldArm(motion.name, spec, qpos, origin, turned, hand, workspace=workspace)
 
 
 def place_of_grasper(
@@ -174,32 +175,30 @@ def model_with_grasper(
         PlacementError: the arm does not reach the whole motion.
     """
 
-    def spec_with_grasper() -> mujoco.MjSpec:
+    def with_grasper() -> tuple[mujoco.MjSpec, str]:
         spec = own_spec(path)
-        add_grasper(spec, at, force=force)
-        return spec
+        return spec, add_grasper(spec, at, force=force)
 
-    led = partial(LedArm, heel=GRASPER_HEEL, tip=GRASPER_TIP, forward=FORWARD)
     try:
-        alone = led(spec_with_grasper(), path.stem, DeviceLimits())
+        spec, prefix = with_grasper()
+        heel, tip = prefix + PADS_HEEL, prefix + PADS_TIP
+        alone = LedArm(spec, path.stem, DeviceLimits(), heel=heel, tip=tip, forward=FORWARD)
         expect_angles(alone.model)
     except ValueError as error:
         raise UsageError(f"[[grasper]] '{motion.name}' model {path}: {error}") from error
     tissue_in_model = TissueFrame(base.rotation.T, base.points_to_tissue(np.zeros(3)))
+    stroke = motion.stroke(HALF_PAD, HALF_PAD)
     if workspace is None:
-        move_to_start(alone, motion.stroke(HALF_PAD, HALF_PAD), tissue_in_model)
+        move_to_start(alone, stroke, tissue_in_model)
     else:
-        start = motion.stroke(HALF_PAD, HALF_PAD).start
-        workspace = move_within(alone, workspace, start, tissue_in_model)
-    spec = spec_with_grasper()
-    add_hand(spec, firm_impedance(alone), GRASPER_HEEL, GRASPER_TIP, FORWARD)
+        workspace = move_within(alone, workspace, stroke.start, tissue_in_model)
+    spec, _ = with_grasper()
+    hand = add_hand(spec, firm_impedance(alone), heel, tip, FORWARD)
+    Grasper(alone.model, alone.data, prefix).put_to(motion.opening(0.0))
     qpos = np.array(alone.data.qpos)
-    for side in ("low", "high"):
-        joint = alone.model.joint(f"{GRASPER}jaw_{side}")
-        qpos[int(joint.qposadr[0])] = 0.5 * motion.opening(0.0)
     turned = frame.rotation @ base.rotation
     origin = frame.points_to_world(base.origin)
-    return HeldArm(motion.name, spec, qpos, origin, _quaternion(turned), workspace)
+    return HeldArm(motion.name, spec, qpos, origin, _quaternion(turned), hand, prefix, workspace)
 
 
 def _quaternion(rotation: FloatArray) -> FloatArray:

@@ -8,10 +8,11 @@ import numpy as np
 
 from bridge import Fixture, FixtureBox, FixtureMesh
 from scalpel_sim.arm.collision_groups import STANDING
+from scalpel_sim.arm.free_names import free_prefix
 from tissue import FloatArray
 
-PREFIX = "fixture_"
-"""What the name of its body begins with; that of the fixture follows."""
+_PREFIX = "fixture_"
+"""What the name of its body begins with, where that is free; that of the fixture follows."""
 
 _THICKNESS = 2e-4
 """Thickness of the plate that a triangle of a mesh is [m]: half that of a scalpel's blade."""
@@ -34,34 +35,31 @@ class StandingFixture(NamedTuple):
     fixture: Fixture
     """Its shape, world frame."""
 
-    @property
-    def body(self) -> str:
-        """Name of its body in the model."""
-        return PREFIX + self.fixture.name
-
-    def stand_in(self, spec: mujoco.MjSpec) -> None:
+    def stand_in(self, spec: mujoco.MjSpec) -> str:
         """Have it stand in the world of a model that is yet to be compiled. It does not move.
 
         A mesh becomes a thin plate for each triangle: as one geom it would be its convex hull.
 
-        Raises:
-            ValueError: another fixture there has its name.
+        Returns:
+            The name of its body there.
         """
-        fixture, common = self.fixture, dict(_COMMON)
-        if spec.body(self.body) is not None:
-            raise ValueError(f"two fixtures have the name {fixture.name!r}")
-        body = spec.worldbody.add_body(name=self.body)
+        fixture, common, whole = self.fixture, dict(_COMMON), self.fixture.name
+        plates = [] if isinstance(fixture, FixtureBox) else list(_plates(fixture))
+        parts = [f"{whole}_{i}" for i in range(len(plates))]
+        names = {"bodies": [whole], "geoms": parts or [whole], "meshes": parts}
+        prefix = free_prefix(spec, names, _PREFIX)
+        body = spec.worldbody.add_body(name=prefix + whole)
         if isinstance(fixture, FixtureBox):
             quaternion = np.empty(4)
             mujoco.mju_mat2Quat(quaternion, fixture.rotation.ravel())
             common |= {"size": 0.5 * fixture.size, "pos": fixture.centre, "quat": quaternion}
-            body.add_geom(name=self.body, type=mujoco.mjtGeom.mjGEOM_BOX, **common)
-            return
-        for i, corners in enumerate(_plates(fixture)):
-            name = f"{self.body}_{i}"
+            body.add_geom(name=prefix + whole, type=mujoco.mjtGeom.mjGEOM_BOX, **common)
+        for part, corners in zip(parts, plates, strict=True):
+            name = prefix + part
             plate = spec.add_mesh(name=name, uservert=corners.ravel())
             plate.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
             body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **common)
+        return prefix + whole
 
 
 def _plates(mesh: FixtureMesh) -> Iterator[FloatArray]:

@@ -7,11 +7,12 @@ import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.arm.collision_groups import STANDING
+from scalpel_sim.arm.free_names import free_prefix
 from scalpel_sim.arm.standing_fixture import STEEL
 from tissue import FloatArray, Geom
 
 TABLETOP = "tabletop"
-"""Name of its geom."""
+"""Name of its geom, where the model has none of that name."""
 
 _COLOUR = (0.32, 0.38, 0.4, 1.0)
 
@@ -32,15 +33,19 @@ class Tabletop(NamedTuple):
         half = np.array(self.geom.size)
         return np.stack([self.centre - half, self.centre + half])
 
-    def stand_in(self, spec: mujoco.MjSpec) -> None:
+    def stand_in(self, spec: mujoco.MjSpec) -> str:
         """Have it stand in the world of a model that is yet to be compiled.
 
         It collides with arms and what they hold.
+
+        Returns:
+            The name of its geom there.
         """
+        name = free_prefix(spec, {"geoms": [TABLETOP]}) + TABLETOP
         quaternion, frame = np.empty(4), self.frame
         mujoco.mju_mat2Quat(quaternion, frame.rotation.ravel())
         spec.worldbody.add_geom(
-            name=TABLETOP,
+            name=name,
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=self.geom.size,
             pos=frame.points_to_world(self.centre),
@@ -51,3 +56,4 @@ class Tabletop(NamedTuple):
             conaffinity=1,
             rgba=_COLOUR,
         )
+        return name

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.arm.hand import ACTUATORS
 from scalpel_sim.preparation import prepare
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.scenes import SCENES
@@ -70,9 +69,8 @@ def _press(hand: str, every: int) -> _Press:
     simulation.pictures.append(observe)
     simulation.run(pressed)
     if hand == "lets go":
-        for name in ACTUATORS:
-            simulation.arm.model.actuator(name).gainprm[:] = 0.0
-            simulation.arm.model.actuator(name).biasprm[:] = 0.0
+        simulation.arm.model.actuator_gainprm[simulation.arm.hand.actuators] = 0.0
+        simulation.arm.model.actuator_biasprm[simulation.arm.hand.actuators] = 0.0
     simulation.run(pressed + _AFTERWARDS)
     places, forces = np.array(poses), np.array([wrench.force for wrench in wrenches])
     arms = np.array([wrench.point for wrench in wrenches]) - places[:, 0]

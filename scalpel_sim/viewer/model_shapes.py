@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.viewer import primitives
 from scalpel_sim.viewer.blade_mesh import blade, edge_in_geom
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
@@ -44,6 +45,7 @@ class Shape(NamedTuple):
 
 def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
     """Yield the geoms that MuJoCo's own viewer would show, except deformable ones (flex)."""
+    names = [model.geom(geom).name for geom in range(model.ngeom)]
     for geom in range(model.ngeom):
         colour = _colour(model, geom)
         if model.geom_group[geom] > LAST_VISIBLE_GROUP or colour[3] == 0.0:
@@ -54,7 +56,7 @@ def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
         mesh = _triangles(model, geom) if edge is None else blade(model.geom_size[geom], *edge)
         if mesh is not None:
             yield Shape(
-                name=model.geom(geom).name or str(geom),
+                name=names[geom] or free_name(str(geom), names),
                 body=body,
                 root=int(model.body_rootid[body]),
                 kind=kind,

@@ -39,7 +39,7 @@ def test_the_collisions_of_every_frame_are_those_of_a_test_in_every_frame(preset
     fixtures = [CLAMP, SHEET]
     monitor = CollisionMonitor(arm, fixtures)
     parts = ArmParts(arm.model, arm.data, arm.blade.body_id)
-    always = Collisions(parts.parts, [*tables(arm.model), *fixtures])
+    always = Collisions(parts.parts, [*tables(arm.model).values(), *fixtures])
     n_touching, n_free = 0, 0
     for _ in wander(arm, rng, 3000):
         monitor.check()

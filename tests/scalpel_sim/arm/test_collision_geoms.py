@@ -38,14 +38,14 @@ def test_the_parts_are_where_the_arm_is(preset):
 
 
 def test_the_table_is_a_box_whose_top_is_the_plane():
-    (table,) = tables(Arm("touch").model)
+    (table,) = tables(Arm("touch").model).values()
     assert table.name == "table"
     assert table.centre[2] + 0.5 * table.size[2] == pytest.approx(0.0)
     np.testing.assert_allclose(table.size, [1.0, 1.0, TABLE_THICKNESS])
 
 
 def test_an_infinite_plane_is_no_table():
-    assert tables(mujoco.MjModel.from_xml_string(MJCF)) == []
+    assert tables(mujoco.MjModel.from_xml_string(MJCF)) == {}
 
 
 def test_the_parts_of_any_other_model_are_found_too():

@@ -7,9 +7,9 @@ import pytest
 from scalpel_sim.arm.arm import ASSETS
 from scalpel_sim.arm.grasper import (
     FORWARD,
-    GRASPER_HEEL,
-    GRASPER_TIP,
     PAD_LENGTH,
+    PADS_HEEL,
+    PADS_TIP,
     SHAFT_LENGTH,
     GrasperError,
     GuidedGrasper,
@@ -36,12 +36,12 @@ FLANGE = """
 
 def held(at="arm", **settings):
     spec = mujoco.MjSpec.from_string(FLANGE)
-    add_grasper(spec, at, **settings)
-    add_hand(spec, Impedance(), GRASPER_HEEL, GRASPER_TIP, FORWARD)
+    prefix = add_grasper(spec, at, **settings)
+    hand = add_hand(spec, Impedance(), prefix + PADS_HEEL, prefix + PADS_TIP, FORWARD)
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    grasper = GuidedGrasper(model, data)
+    grasper = GuidedGrasper(model, data, prefix, hand)
     grasper.hold()
     return model, data, grasper
 

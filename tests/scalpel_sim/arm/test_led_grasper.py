@@ -9,8 +9,9 @@ from bridge import TissueFrame
 from scalpel_sim.arm.geom_coupling import GeomCoupling
 from scalpel_sim.arm.grasper import (
     FORWARD,
-    GRASPER_HEEL,
-    GRASPER_TIP,
+    GRASPER,
+    PADS_HEEL,
+    PADS_TIP,
     SHAFT_LENGTH,
     GuidedGrasper,
     Pads,
@@ -55,7 +56,7 @@ def led(motion, tissue, frame=TissueFrame(), hold=Hold(closed=0.008), force=None
     """A grasper on a gantry, at the start of its motion."""
     spec = mujoco.MjSpec.from_string(GANTRY)
     add_grasper(spec, "arm", force=force)
-    add_hand(spec, Impedance(), GRASPER_HEEL, GRASPER_TIP, FORWARD)
+    add_hand(spec, Impedance(), GRASPER + PADS_HEEL, GRASPER + PADS_TIP, FORWARD)
     model = spec.compile()
     data = mujoco.MjData(model)
     start = frame.points_to_world(motion.stroke(0.0, 1e-3).pose(0.0).heel)
