@@ -22,6 +22,7 @@ from scalpel_sim.arm.grasper import (
 )
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
+from scalpel_sim.arm.lacking_reach import place_of_arm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.own_arm import (
     expect_angles,
@@ -188,10 +189,11 @@ def model_with_grasper(
         raise UsageError(f"[[grasper]] '{motion.name}' model {path}: {error}") from error
     tissue_in_model = TissueFrame(base.rotation.T, base.points_to_tissue(np.zeros(3)))
     stroke = motion.stroke(HALF_PAD, HALF_PAD)
+    place = place_of_arm(f"[[grasper]] '{motion.name}'", base)
     if workspace is None:
-        move_to_start(alone, stroke, tissue_in_model)
+        move_to_start(alone, stroke, tissue_in_model, place)
     else:
-        workspace = move_within(alone, workspace, stroke.start, tissue_in_model)
+        workspace = move_within(alone, workspace, stroke.start, tissue_in_model, place)
     spec, _ = with_grasper()
     hand = add_hand(spec, firm_impedance(alone), heel, tip, FORWARD)
     Grasper(alone.model, alone.data, prefix).put_to(motion.opening(0.0))

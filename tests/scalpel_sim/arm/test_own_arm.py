@@ -11,7 +11,6 @@ import pytest
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.arm.own_arm import move_to_start, own_arm
-from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_file.writing import scene_text
 from scalpel_sim.scene_parts.scene import changed
@@ -92,9 +91,23 @@ def test_inverse_kinematics_has_the_edge_at_the_start_of_the_stroke(place):
     assert found.forward @ wanted.forward > 0.9999
 
 
-def test_a_stroke_out_of_reach_is_refused_with_the_distance():
-    with pytest.raises(PlacementError, match=r"does not reach the stroke: at 0\.00 s .* mm away"):
-        move_to_start(robot(), stroke_to(0.0, 2.0, 0.1), TissueFrame())
+def test_sensors_and_states_of_actuators_go_with_them(tmp_path):
+    path = changed_model(
+        tmp_path,
+        (
+            '<position joint="elbow" kp="2000"/>',
+            '<general name="of_elbow" joint="elbow" dyntype="filter"/>',
+        ),
+        ('<key name="home"', '<key name="home" act="0" ctrl="0 0 0 0 0 0"'),
+        (
+            "</actuator>",
+            """</actuator><sensor><actuatorfrc name="gone" actuator="of_elbow"/>
+            <jointpos name="kept" joint="elbow"/></sensor>""",
+        ),
+    )
+    model = own_arm(path, DeviceLimits(), forward=FORWARD).model
+    assert [model.sensor(i).name for i in range(model.nsensor)] == ["kept"]
+    assert (model.na, model.key("home").id) == (0, 0)
 
 
 def test_gravity_is_compensated_and_actuators_are_taken_out():
@@ -115,7 +128,7 @@ def test_gravity_is_compensated_and_actuators_are_taken_out():
         (('name="tip"', 'name="end"'), "has no site 'tip'. It has: 'heel', 'end'"),
         (
             ('<joint name="wrist_3"/>', '<joint name="wrist_3" type="ball" range="0 1"/>'),
-            "hinges and slides",
+            "other joints than hinges and slides: 'wrist_3' of body 'wrist_3' (ball)",
         ),
         (("<mujoco ", "<mujoko "), "robot.xml"),
     ],
