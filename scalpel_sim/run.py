@@ -23,9 +23,11 @@ from scalpel_sim.output.run_folder import (
     grasp_file,
 )
 from scalpel_sim.output.summary import COMPLETE, Summary
-from scalpel_sim.scene_file.writing import scene_text
+from scalpel_sim.scene_file.writing import relative_path, scene_text
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.state.file_sum import FileSum, sum_of
+from scalpel_sim.state.run_notes import RunPlan
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.tables.stroke import StrokeTable
@@ -78,9 +80,9 @@ def perform(
         Interrupted: the user or the system ended the run.
         RunError: the run failed, or a file could not be written. The other files are.
     """
-    checkpoint = None if outputs.resumption is None else outputs.resumption.checkpoint
-    if checkpoint is not None:
-        settings = checkpoint.head.settings
+    plan = None if outputs.resumption is None else outputs.resumption.plan
+    if plan is not None:
+        settings = plan.settings
     seconds = run_time(simulation, seconds)
     hand = None if controls is None else controls.hand
     simulation.recording.keep_in(outputs.folder)
@@ -92,10 +94,10 @@ def perform(
             views=views,
             log=log,
         )
-        start = _begin(simulation, outputs, scene, hand)
-        simulation.pictures.append(into_replay(replay))
         until = None if hand is not None else seconds
-        with RunCheckpoints(outputs, simulation, replay, settings, until) as checkpoints:
+        start = _begin(simulation, outputs, scene, hand, settings, until)
+        simulation.pictures.append(into_replay(replay))
+        with RunCheckpoints(outputs, simulation, replay) as checkpoints:
             if controls is not None:
                 controls.history.begin(checkpoints, outputs, replay)
             failure = _run_frames(
@@ -158,11 +160,24 @@ def _raise_what_ended_it(
 
 
 def _begin(
-    simulation: Simulation, outputs: Outputs, scene: Scene | None, hand: LedHand | None
+    simulation: Simulation,
+    outputs: Outputs,
+    scene: Scene | None,
+    hand: LedHand | None,
+    settings: dict[str, Any],
+    seconds: float | None,
 ) -> RunStart:
     """Write what is known before the first frame, and keep space for what comes after the last.
 
     A run that goes on is put where it was first: what is refused leaves its folder as it is.
+
+    Args:
+        simulation: At its start.
+        outputs: The folder of the files.
+        scene: See `perform`.
+        hand: What leads the blade, or None for a script.
+        settings: Settings to keep in the summary.
+        seconds: How long the run is to last [s]; None: as long as the hand leads.
 
     Raises:
         StateError: a run that goes on is made otherwise than it was.
@@ -171,19 +186,20 @@ def _begin(
     body, title, at_first = simulation.link.describe(), simulation.title, simulation.link.snapshot()
     if hand is not None:
         hand.take_over(simulation)
-    resumption = outputs.resumption
-    has_first_mesh = resumption is not None and outputs.path(INITIAL).exists()
-    if resumption is not None:
-        resumption.load_into(simulation)
-        if has_first_mesh:
-            outputs.keep_reserve()
+    if outputs.resumption is not None:
+        outputs.resumption.load_into(simulation)
+        outputs.write_mesh(INITIAL, at_first)  # its size is that of the space that is kept
+        outputs.keep_reserve()
         outputs.remove_earlier_files()
     scene = _scene_to_write(scene, hand, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
-    outputs.write_mesh(INITIAL, at_first)
-    if not has_first_mesh:
+    exports = [str(path.absolute()) for path in outputs.exports]
+    read = {} if scene is None or hand is not None else _sums_of_recorded(scene, outputs)
+    outputs.begin_journal(RunPlan(simulation.dt, text, exports, settings), seconds, read)
+    if outputs.resumption is None:
+        outputs.write_mesh(INITIAL, at_first)
         outputs.keep_reserve()
     # What graspers move is elsewhere when the blade comes.
     asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
@@ -292,6 +308,17 @@ def _scene_to_write(scene: Scene | None, hand: LedHand | None, outputs: Outputs)
         for each in scene.graspers
     ]
     return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
+
+
+def _sums_of_recorded(scene: Scene, outputs: Outputs) -> dict[str, FileSum]:
+    """Return the checksums of the motions that a run repeats, by path seen from its folder.
+
+    No state knows them: that of a run that a hand led is of a stroke which is not recorded yet.
+
+    Raises:
+        OSError: one cannot be read.
+    """
+    return {relative_path(path, outputs.folder): sum_of(path) for path in scene.recorded_files}
 
 
 def run_time(simulation: Simulation, seconds: float | None) -> float:

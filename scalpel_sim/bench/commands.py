@@ -232,7 +232,7 @@ def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: Print
         save_results,
     )
     from scalpel_sim.cli.run_setup import load_kernels
-    from scalpel_sim.output.run_folder import check_file
+    from scalpel_sim.output.file_check import check_file
 
     if not 1 <= options.runs <= MOST_ROUNDS:
         raise UsageError(f"--runs is {options.runs}; it must be from 1 to {MOST_ROUNDS}")

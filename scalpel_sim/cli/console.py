@@ -132,7 +132,7 @@ def print_report(
 ) -> None:
     """Print the summary of a run, as a table or as JSON, and the names of its files."""
     if options.json:
-        from scalpel_sim.output.run_folder import summary_json
+        from scalpel_sim.output.summary import summary_json
 
         print(summary_json(summary))
     elif not options.quiet:

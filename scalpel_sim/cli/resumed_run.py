@@ -9,7 +9,7 @@ from scalpel_sim.cli.scripted_run import perform_script
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.resumption import Resumption, resumption_of
-from scalpel_sim.output.run_folder import SCENE, STROKE, check_folder, grasp_file
+from scalpel_sim.output.run_folder import SCENE, check_folder
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.scenes import read_scene
 from scalpel_sim.strokes.led_record import end_record
@@ -33,17 +33,18 @@ def perform_resumed(
             its mesh, is another one now.
         Interrupted: the user or the system ended the run.
         RunError: another run writes there, or the run failed.
+        OSError: a file cannot be read.
     """
     _expect_no_options(options)
     if folder.is_dir():
         check_folder(folder)  # no run writes there
     resumption = resumption_of(folder)
-    head = None if resumption.checkpoint is None else resumption.checkpoint.head
-    if head is None or head.seconds is None:
+    resumption.put_back_scene(folder)
+    if resumption.seconds is None:
         _end_records(folder, resumption)
     exports = options.output.export
-    if head is not None and not exports:
-        exports = tuple(map(Path, head.exports))
+    if resumption.plan is not None and not exports:
+        exports = tuple(map(Path, resumption.plan.exports))
     options = options._replace(output=replace(options.output, out=folder, export=exports))
     with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
         return perform_script(prepared, options, plotter, resumption=resumption), prepared
@@ -71,16 +72,14 @@ def _expect_no_options(options: RunOptions) -> None:
 
 def _end_records(folder: Path, resumption: Resumption) -> None:
     """End the records of a hand, if one led the run."""
-    times = resumption.recorded.column("time_s")
-    if len(times) < 2:
-        return
-    scene = read_scene(folder / SCENE)
-    names = [STROKE] if any(stroke.kind == "recorded" for stroke in scene.strokes) else []
-    names += [grasp_file(each.name) for each in scene.graspers if each.recorded is not None]
-    t_end = len(times) * float(times[1] - times[0])
-    for path in (folder / name for name in names):
+    plan, last = resumption.plan, resumption.last
+    t_end = 0.0 if plan is None or last is None else last.n_frames * plan.dt
+    for path in read_scene(folder / SCENE).recorded_files:
+        if path.parent.resolve() != folder.resolve():
+            continue
+        done = None if last is None else last.written.get(path.name)
         try:
-            end_record(path, t_end)
+            end_record(path, t_end, None if done is None else done.n_bytes)
         except (OSError, ValueError) as error:
             raise RunError(
                 f"{path}: what the hand did cannot be read ({error}), and the run cannot go on"

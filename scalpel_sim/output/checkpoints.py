@@ -39,22 +39,24 @@ class Checkpoints:
         self._written: Future[None] | None = None
         self._has_failed = False
 
-    def read(self) -> list[Checkpoint]:
+    def read(self, *, is_said: bool = False) -> list[Checkpoint]:
         """Return the whole checkpoints of a run that goes on, the last one first.
 
-        Of one that is not whole that is logged.
+        Args:
+            is_said: Whether those that are not whole have been logged; else they are.
         """
         found = []
         for slot, name in enumerate(CHECKPOINT_FILES):
             try:
                 checkpoint = read_checkpoint(self._folder / name)
             except (StateError, OSError) as error:
-                _log.warning("%s; it is left out", error)
+                if not is_said:
+                    _log.warning("%s; it is left out", error)
                 continue
             if checkpoint is not None:
-                self._frames[slot] = checkpoint.head.n_frames
+                self._frames[slot] = checkpoint.head.mark.n_frames
                 found.append(checkpoint)
-        return sorted(found, key=lambda each: -each.head.n_frames)
+        return sorted(found, key=lambda each: -each.head.mark.n_frames)
 
     def go_on_from(self, n_frames: int) -> None:
         """Go on after so many frames: the checkpoints of more, which were undone, are removed."""
@@ -84,7 +86,7 @@ class Checkpoints:
         """
         self.finish()
         checkpoint = make()
-        n_frames = checkpoint.head.n_frames
+        n_frames = checkpoint.head.mark.n_frames
         slot = min((0, 1), key=lambda each: -1 if (n := self._frames[each]) is None else n)
         self._frames[slot], self._due = n_frames, n_frames + self._every
         self._written = self._thread.submit(self._write, slot, checkpoint)

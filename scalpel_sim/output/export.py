@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.output.run_folder import check_file
+from scalpel_sim.output.file_check import check_file
 from tissue import BoolArray, FloatArray, IntArray, Surface, whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from scalpel_sim.state.file_sum import FileSum
+
 
 class GrowingFile:
     """A file to which whole rows are added. What cannot be written is kept for the next attempt.
@@ -11,27 +13,24 @@ class GrowingFile:
     Args:
         path: The file; one that is there is replaced.
         head: Its first line [bytes], which stays when the file is cut back.
-        n_kept: How much is kept of a file that is there [bytes]; 0: it is replaced.
+        kept: What is kept of a file that is there; of no bytes: it is replaced.
 
     Raises:
         OSError: the system refuses.
     """
 
-    def __init__(self, path: Path, head: bytes, n_kept: int = 0) -> None:
+    def __init__(self, path: Path, head: bytes, kept: FileSum = FileSum()) -> None:
         self.path = path
-        self._file = path.open("r+b" if n_kept else "wb", buffering=0)
-        self._length = n_kept  # of the whole rows that are on disk
+        self._file = path.open("r+b" if kept.n_bytes else "wb", buffering=0)
+        self._length = kept.n_bytes  # of the whole rows that are on disk
         self._pending = b""
-        self._n_head = len(head)
-        if n_kept:
-            self._cut(n_kept)
+        self._head = FileSum().after(head)
+        self.sum = kept
+        """Length and checksum, with what is not written yet."""
+        if kept.n_bytes:
+            self._cut(kept.n_bytes)
         else:
             self.append(head)
-
-    @property
-    def length(self) -> int:
-        """Length with what is not written yet [bytes]."""
-        return self._length + len(self._pending)
 
     def append(self, rows: bytes) -> None:
         """Add whole rows, after those that could not be written before.
@@ -41,6 +40,7 @@ class GrowingFile:
                 the rows are kept.
         """
         self._pending += rows
+        self.sum = self.sum.after(rows)
         if not self._pending:
             return
         rest = memoryview(self._pending)
@@ -53,13 +53,14 @@ class GrowingFile:
         self._length += len(self._pending)
         self._pending = b""
 
-    def cut_back(self, length: int | None) -> None:
-        """Take off what was added after the file had this length [bytes]; None: all but the head.
+    def cut_back(self, mark: FileSum | None) -> None:
+        """Take off what was added after `sum` was this; None: all but the head.
 
         Raises:
             OSError: the system refuses.
         """
-        end = self._n_head if length is None else length
+        self.sum = self._head if mark is None else mark
+        end = self.sum.n_bytes
         self._pending = self._pending[: max(end - self._length, 0)]
         if end < self._length:
             self._cut(end)

@@ -1,50 +1,88 @@
 """What the folder of an interrupted run has, and how a run goes on from there."""
 
 import json
-from collections.abc import Iterator
+import logging
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.errors import RunError, UsageError, one_line
+from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.checkpoints import Checkpoints
 from scalpel_sim.output.recording import WALL_TIMES, Recording, read_forces
-from scalpel_sim.output.run_folder import FORCES, REPLAY_FRAMES, SCENE, SUMMARY
+from scalpel_sim.output.run_folder import (
+    FORCES,
+    INITIAL,
+    JOURNAL,
+    PASSING_FILES,
+    REPLAY_FRAMES,
+    SCENE,
+    SUMMARY,
+)
 from scalpel_sim.output.summary import COMPLETE
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state.checkpoint import Checkpoint
+from scalpel_sim.state.file_sum import FileSum, sum_of, sums_that_hold
+from scalpel_sim.state.run_notes import RunMark, RunPlan, read_journal
 from scalpel_sim.state.simulation_state import SimulationState
-from tissue import FloatArray
+from tissue import FloatArray, whole_file
 
-_BYTES_PER_LOOK = 4096
-"""How much of a text is looked through at once for the end of a line [bytes]."""
+CHANGED_SCENE = "scene.changed.toml"
+"""Name of a `scene.toml` that was not the one of the run."""
+
+_log = logging.getLogger(__name__)
 
 
 class Resumption(NamedTuple):
-    """What is there of a run that was interrupted."""
+    """What is there of a run that was interrupted, as far as its checksums hold."""
 
+    plan: RunPlan | None
+    """What it was asked for; None: no note of it is whole."""
+    last: RunMark | None
+    """How far it had got by the last note."""
     recorded: Recording
-    """The whole rows of `forces.csv`."""
-    n_bytes: int
-    """Their length, with the first line [bytes]; 0 where there is no such file."""
+    """The rows of `forces.csv`."""
+    forces: FileSum
+    """Their length, with the first line."""
+    n_journal: int
+    """Length of the journal until there [bytes]."""
     checkpoint: Checkpoint | None
     """Where the run goes on; None: at its start."""
 
     @property
     def n_frames(self) -> int:
         """Number of frames that are not done again."""
-        return 0 if self.checkpoint is None else self.checkpoint.head.n_frames
+        return 0 if self.checkpoint is None else self.checkpoint.head.mark.n_frames
 
     @property
     def seconds(self) -> float | None:
         """How long the run is to last [s]; None: as its scene says, or what a hand did."""
-        return None if self.checkpoint is None else self.checkpoint.head.seconds
+        return None if self.last is None else self.last.seconds
 
     @property
-    def replay(self) -> int:
-        """How far the frames of the replay had got [bytes]."""
-        return 0 if self.checkpoint is None else self.checkpoint.head.replay
+    def replay(self) -> FileSum:
+        """How far the frames of the replay had got."""
+        checkpoint = self.checkpoint
+        return FileSum() if checkpoint is None else checkpoint.head.mark.written[REPLAY_FRAMES]
+
+    def put_back_scene(self, folder: Path) -> None:
+        """Write `scene.toml` as it was, if it is another one now, which then has another name.
+
+        Raises:
+            OSError: the system refuses.
+        """
+        path = folder / SCENE
+        text = None if self.plan is None else self.plan.scene
+        if text is None or (path.exists() and path.read_bytes() == text.encode()):
+            return
+        kept = ""
+        if path.exists():
+            path.replace(folder / CHANGED_SCENE)
+            kept = f", and what was there is {CHANGED_SCENE}"
+        with whole_file(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
+        _log.warning("%s was changed, damaged or removed; it is as it was again%s", path, kept)
 
     def load_into(self, simulation: Simulation) -> None:
         """Put a simulation, which is at its start, to where the run goes on.
@@ -60,37 +98,125 @@ class Resumption(NamedTuple):
 
 
 def resumption_of(folder: Path) -> Resumption:
-    """Return what is there of the run whose files are in a folder.
+    """Return what is there of the run whose files are in a folder. What is damaged is logged.
 
     Raises:
         UsageError: there is nothing to go on with; the message says why.
+        OSError: a file cannot be read.
     """
-    if not (folder / SCENE).is_file():
-        why = "it holds no run, or one without a scene.toml: its tissue was in another process"
-        reason = why if folder.is_dir() else "there is no such folder"
-        raise UsageError(
-            f"--resume {folder}: {reason}. A run with --connect cannot be resumed; what its folder "
-            "has of it, forces.csv and replay.html, stays"
-        )
-    if _status_in(folder) == COMPLETE and not (folder / REPLAY_FRAMES).exists():
+    if not folder.is_dir():
+        raise UsageError(f"--resume {folder}: there is no such folder")
+    has_ended = not any((folder / name).exists() for name in PASSING_FILES)
+    if has_ended and _status_in(folder) == COMPLETE:
         raise UsageError(f"--resume {folder}: that run is complete; there is nothing to go on with")
-    forces = folder / FORCES
-    n_forces = _whole_lines(forces) if forces.exists() else 0
-    if n_forces == 0:  # it was killed before it wrote one
-        return Resumption(Recording(), 0, None)
-    try:
-        recorded = read_forces(forces)
-    except (OSError, ValueError) as error:
-        raise UsageError(
-            f"--resume {folder}: {FORCES} was changed or damaged ({one_line(error)}). Put back "
-            f"what it was, or do the run again from its {SCENE}, with another --out"
-        ) from error
     with Checkpoints(folder) as checkpoints:
         found = checkpoints.read()
-    replay = folder / REPLAY_FRAMES
-    n_bytes = replay.stat().st_size if replay.exists() else 0
-    whole = (c for c in found if c.head.n_frames <= len(recorded) and c.head.replay <= n_bytes)
-    return Resumption(recorded, n_forces, next(whole, None))
+    noted = read_journal(folder / JOURNAL)
+    plan = found[0].head.plan if noted.plan is None and found else noted.plan
+    if not (folder / SCENE).exists() and (plan is None or plan.scene is None):
+        raise UsageError(f"--resume {folder}: {_why_no_scene(folder, plan)}")
+    if plan is None:
+        _log.warning(
+            "%s: no note of what the run was asked for is whole; it is done as %s says, without "
+            "--export unless that is given again",
+            folder,
+            SCENE,
+        )
+    marks = [*(each.head.mark for each in reversed(found)), *noted.marks]
+    last = max(reversed(marks), key=lambda mark: mark.written[FORCES].n_bytes, default=None)
+    if last is not None:
+        _expect_recorded(folder, last)
+    whole = sums_that_hold(folder / FORCES, (mark.written[FORCES] for mark in marks))
+    forces = max(whole, default=FileSum())
+    n_journal = [
+        end
+        for mark, end in zip(noted.marks, noted.ends, strict=True)
+        if mark.written[FORCES] in whole
+    ]
+    recorded = read_forces(folder / FORCES, forces.n_bytes) if forces.n_bytes else Recording()
+    _warn_of_rows(folder / FORCES, marks, recorded, forces)
+    checkpoint = _last_that_holds(folder, found, whole)
+    return Resumption(plan, last, recorded, forces, max(n_journal, default=0), checkpoint)
+
+
+def _why_no_scene(folder: Path, plan: RunPlan | None) -> str:
+    """Return why a folder without a `scene.toml` has no run that can go on."""
+    if plan is not None or (folder / INITIAL).exists():
+        return (
+            f"it has no {SCENE}: the tissue of its run was in another process, or the file was "
+            "removed. A run with --connect cannot be resumed; what its folder has of it stays"
+        )
+    if (folder / FORCES).exists():
+        return f"its run ended before it wrote its {SCENE}: nothing was done yet. Begin it again"
+    return "it holds no run"
+
+
+def _expect_recorded(folder: Path, last: RunMark) -> None:
+    """Refuse to go on if what a hand did, which the run repeats, is not what it was.
+
+    Raises:
+        UsageError: it is not; the message names the file.
+        OSError: it cannot be read.
+    """
+    done = {} if last.seconds is not None else last.written
+    led = {name: each for name, each in done.items() if name not in (FORCES, REPLAY_FRAMES)}
+    other = [name for name, each in led.items() if not sums_that_hold(folder / name, [each])]
+    for name, each in last.read.items():
+        if not (folder / name).exists() or sum_of(folder / name) != each:
+            other.append(name)
+    if other:
+        raise UsageError(
+            f"--resume {folder}: {folder / other[0]} was changed, damaged or removed, and nothing "
+            "else holds the motion that the run repeats. Put back what it was"
+        )
+
+
+def _warn_of_rows(
+    path: Path, marks: Sequence[RunMark], recorded: Recording, forces: FileSum
+) -> None:
+    """Say that rows of `forces.csv` are done again which were written, if there are any."""
+    n_bytes = max((mark.written[FORCES].n_bytes for mark in marks), default=0)
+    if path.exists():
+        n_bytes = max(n_bytes, path.stat().st_size)
+    if n_bytes > forces.n_bytes:
+        _log.warning(
+            "%s: what follows after frame %d was changed, damaged or removed, or has no checksum; "
+            "it is done again",
+            path,
+            len(recorded),
+        )
+
+
+def _last_that_holds(
+    folder: Path, found: Sequence[Checkpoint], whole: set[FileSum]
+) -> Checkpoint | None:
+    """Return the last checkpoint for which the other files are as they were; None: there is none.
+
+    Args:
+        folder: Where the files are.
+        found: The checkpoints, the last one first.
+        whole: Checksums that hold for `forces.csv`.
+    """
+    sums = (each.head.mark.written[REPLAY_FRAMES] for each in found)
+    frames = sums_that_hold(folder / REPLAY_FRAMES, sums)
+    for each in found:
+        written = each.head.mark.written
+        damaged = [
+            name
+            for name, held in ((FORCES, whole), (REPLAY_FRAMES, frames))
+            if written[name] not in held
+        ]
+        if not damaged:
+            return each
+        _log.warning(
+            "%s: the checkpoint after frame %d is left out, since %s was changed, damaged or "
+            "removed",
+            folder,
+            each.head.mark.n_frames,
+            " and ".join(damaged),
+        )
+    _log.warning("%s: no checkpoint is whole; the run begins again at its start", folder)
+    return None
 
 
 class RepeatedFrames:
@@ -123,8 +249,8 @@ class RepeatedFrames:
             raise RunError(
                 f"{self._folder / FORCES}: frame {len(recording)} is done again, and {name} is "
                 f"{float(now[differs[0]])!r}, not {float(then[differs[0]])!r} as it was: the run "
-                "went on with another version of the program or its libraries, or on another "
-                f"machine, or the file was changed. Do it again from its {SCENE}"
+                "went on with another version of the program or its libraries, on another "
+                f"machine, or with another mesh or model. Do it again from its {SCENE}"
             )
         recording.cut_back(len(recording) - 1)
         recording.append(then.tolist())
@@ -135,20 +261,6 @@ def _is_same(one: float, other: float) -> bool:
     if np.isnan(one) or np.isnan(other):
         return bool(np.isnan(one) and np.isnan(other))
     return bool(one == other and np.signbit(one) == np.signbit(other))
-
-
-def _whole_lines(path: Path) -> int:
-    """Return the length of a text up to the end of its last whole line [bytes]."""
-    with path.open("rb") as file:
-        end = file.seek(0, 2)
-        while end > 0:
-            begin = max(0, end - _BYTES_PER_LOOK)
-            file.seek(begin)
-            place = file.read(end - begin).rfind(b"\n")
-            if place >= 0:
-                return begin + place + 1
-            end = begin
-    return 0
 
 
 def _status_in(folder: Path) -> str | None:

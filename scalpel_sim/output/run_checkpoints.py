@@ -1,6 +1,6 @@
 """`RunCheckpoints`: makes the checkpoints of a run from what it is after a frame."""
 
-from typing import Any, Self
+from typing import Self
 
 from bridge import InProcessLink
 from scalpel_sim.output.checkpoints import Checkpoints
@@ -17,27 +17,17 @@ class RunCheckpoints:
         outputs: Where they are written, and how often.
         simulation: The run.
         replay: Its replay.
-        settings: What the summary will say of its settings.
-        seconds: How long it is to last [s]; None: as long as what a hand did, which leads it.
     """
 
-    def __init__(
-        self,
-        outputs: Outputs,
-        simulation: Simulation,
-        replay: ReplayWriter,
-        settings: dict[str, Any],
-        seconds: float | None,
-    ) -> None:
+    def __init__(self, outputs: Outputs, simulation: Simulation, replay: ReplayWriter) -> None:
         self._outputs, self._simulation, self._replay = outputs, simulation, replay
-        self._settings, self._seconds = settings, seconds
         every = 0
         if outputs.checkpoint_seconds > 0.0 and isinstance(simulation.link, InProcessLink):
             every = max(1, round(outputs.checkpoint_seconds / simulation.dt))
         grown = (FORCES, REPLAY_FRAMES, STROKE, *(grasp_file(g.name) for g in simulation.graspers))
         self._checkpoints = Checkpoints(outputs.folder, every, grown)
         if outputs.resumption is not None:
-            self._checkpoints.read()
+            self._checkpoints.read(is_said=True)
             self._checkpoints.go_on_from(outputs.resumption.n_frames)
 
     def __enter__(self) -> Self:
@@ -77,11 +67,6 @@ class RunCheckpoints:
     def _now(self) -> Checkpoint:
         """Return the run as it is."""
         simulation = self._simulation
-        head = CheckpointHead(
-            n_frames=len(simulation.recording),
-            replay=self._replay.mark(),
-            seconds=self._seconds,
-            exports=[str(path.absolute()) for path in self._outputs.exports],
-            settings=self._settings,
-        )
+        n_frames, replay = len(simulation.recording), self._replay.mark()
+        head = CheckpointHead(*self._outputs.checkpoint_notes(n_frames, replay))
         return Checkpoint(head, simulation.save_state().to_bytes())

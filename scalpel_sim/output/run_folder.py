@@ -1,16 +1,13 @@
 """The folder of a run's files, which stays readable when the run ends early."""
 
 import contextlib
-import json
-import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
+from typing import TYPE_CHECKING, NamedTuple, Self, TypeVar, cast
 
-import msgspec
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
@@ -19,13 +16,16 @@ from scalpel_sim.output.disk_reserve import DiskReserve
 from scalpel_sim.output.folder_lock import FolderLock
 from scalpel_sim.output.growing_file import GrowingFile
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS, Recording
-from scalpel_sim.output.summary import Summary
+from scalpel_sim.output.recording import COLUMNS, Recording, lines_of_rows
+from scalpel_sim.output.run_journal import RunJournal
+from scalpel_sim.output.summary import Summary, summary_json
+from scalpel_sim.state.file_sum import FileSum
+from scalpel_sim.state.run_notes import RunMark, RunPlan, line_of
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import FloatArray, Snapshot, remove_unfinished, whole_file, write_vtu
+from tissue import Snapshot, remove_unfinished, whole_file, write_vtu
 
 if TYPE_CHECKING:
     from scalpel_sim.output.resumption import Resumption
@@ -49,7 +49,10 @@ RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 REPLAY_FRAMES = "replay.part"
 """The frames of the replay, while the run goes on."""
 
-PASSING_FILES = (*CHECKPOINT_FILES, REPLAY_FRAMES)
+JOURNAL = "journal.part"
+"""What the run notes of itself, while it goes on."""
+
+PASSING_FILES = (*CHECKPOINT_FILES, REPLAY_FRAMES, JOURNAL)
 """Names of files that are there until a run is complete."""
 
 FRAMES_PER_FLUSH = 25
@@ -75,10 +78,8 @@ class FilesMark(NamedTuple):
 
     n_rows: int
     """Rows of `forces.csv`."""
-    forces: int
-    """Length of `forces.csv` [bytes]."""
-    led: dict[str, int]
-    """Lengths of the files of what a hand did, by name [bytes]."""
+    grown: dict[str, FileSum]
+    """How far each file has got, by name."""
 
 
 class Outputs:
@@ -119,13 +120,14 @@ class Outputs:
         try:
             if resumption is None:
                 self.remove_earlier_files()
-            n_kept = 0 if resumption is None else resumption.n_bytes
-            self._forces = self._growing(FORCES, columns, n_kept)
+            kept = FileSum() if resumption is None else resumption.forces
+            self._forces = self._growing(FORCES, columns, kept)
         except BaseException:
             self._lock.release()
             raise
         self._n_written = 0 if resumption is None else len(resumption.recorded)
         self._led: dict[str, GrowingFile] = {}
+        self._journal: RunJournal | None = None
 
     def path(self, name: str) -> Path:
         """Return where a file of this run lies."""
@@ -137,10 +139,10 @@ class Outputs:
         Raises:
             RunError: the system refuses.
         """
-        kept = () if self.resumption is None else (SCENE, FORCES, *PASSING_FILES)
+        kept = () if self.resumption is None else (SCENE, INITIAL, FORCES, *PASSING_FILES)
         for name in (*PASSING_FILES, *RUN_FILES):
-            if name not in kept:
-                _naming_path(self.folder / name, _remove)
+            removed = remove_unfinished if name in kept else _remove
+            _naming_path(self.folder / name, removed)
 
     def keep_reserve(self) -> None:
         """Keep space on the disk for the last files, once `initial.vtu` is written.
@@ -167,6 +169,43 @@ class Outputs:
         """Write `scene.toml`."""
         self._write_whole(SCENE, lambda path: path.write_text(text, encoding="utf-8"))
 
+    def begin_journal(
+        self, plan: RunPlan, seconds: float | None, read: Mapping[str, FileSum]
+    ) -> None:
+        """Begin the notes that `--resume` needs; from now on they grow with `forces.csv`.
+
+        Args:
+            plan: See `RunJournal`, as the others.
+            seconds: How long the run is to last [s].
+            read: Files of recorded motions.
+        """
+        n_kept = 0 if self.resumption is None else self.resumption.n_journal
+        self._journal = _naming_path(
+            self.path(JOURNAL), lambda path: RunJournal(path, plan, seconds, read, n_kept)
+        )
+        self._note_rows()
+
+    def checkpoint_notes(self, n_frames: int, replay: FileSum) -> tuple[RunPlan, RunMark]:
+        """Return what a checkpoint notes of the run after so many frames.
+
+        Args:
+            n_frames: Frames that were done, of which all rows are written.
+            replay: How far the file of the replay's frames has got.
+        """
+        assert self._journal is not None
+        written = self._written() | {REPLAY_FRAMES: replay}
+        return self._journal.plan, self._journal.mark(n_frames, written)
+
+    def _written(self) -> dict[str, FileSum]:
+        """Return how far `forces.csv` and the files of what a hand did have got."""
+        return {file.path.name: file.sum for file in (self._forces, *self._led.values())}
+
+    def _note_rows(self) -> None:
+        """Note the rows that are written."""
+        if self._journal is not None:
+            mark = self._journal.mark(self._n_written, self._written())
+            _append(self._journal.file, line_of(mark))
+
     def write_mesh(self, name: str, snapshot: Snapshot) -> None:
         """Write the body as `initial.vtu` or `final.vtu`."""
         _naming_path(self.path(name), lambda path: write_vtu(path, snapshot))
@@ -183,9 +222,10 @@ class Outputs:
         has_new = len(recording) > self._n_written
         if not (self.are_rows_due(recording) or (all_rows and has_new)):
             return
-        rows = _csv(recording.since(self._n_written))
+        rows = lines_of_rows(recording.since(self._n_written))
         self._n_written = len(recording)
         _append(self._forces, rows)
+        self._note_rows()
 
     def write_stroke(self, rows: Sequence[Sequence[float]]) -> None:
         """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew."""
@@ -204,7 +244,7 @@ class Outputs:
         """
         if name not in self._led:
             self._led[name] = self._growing(name, columns)
-        _append(self._led[name], _csv(np.array(rows)) if rows else b"")
+        _append(self._led[name], lines_of_rows(np.array(rows)) if rows else b"")
 
     def write_pending(self) -> None:
         """Add what the system refused before to `forces.csv` and the files of what a hand did."""
@@ -212,9 +252,14 @@ class Outputs:
             _append(file, b"")
 
     def mark(self) -> FilesMark:
-        """Return how far `forces.csv` and the files of what a hand did have got."""
-        led = {name: file.length for name, file in self._led.items()}
-        return FilesMark(self._n_written, self._forces.length, led)
+        """Return how far the files that grow have got."""
+        return FilesMark(self._n_written, {f.path.name: f.sum for f in self._growing_files})
+
+    @property
+    def _growing_files(self) -> list[GrowingFile]:
+        """The files that grow: first the journal, which is never to note more than they hold."""
+        noted = [] if self._journal is None else [self._journal.file]
+        return [*noted, self._forces, *self._led.values()]
 
     def cut_back(self, mark: FilesMark) -> None:
         """Take off what was written to these files after a mark.
@@ -223,9 +268,8 @@ class Outputs:
             RunError: the system refuses.
         """
         self._n_written = mark.n_rows
-        _naming_path(self.path(FORCES), lambda _: self._forces.cut_back(mark.forces))
-        for name, file in self._led.items():
-            _naming_path(self.path(name), partial(_cut_back, file, mark.led.get(name)))
+        for file in self._growing_files:
+            _naming_path(file.path, partial(_cut_back, file, mark.grown.get(file.path.name)))
 
     def start_plots(self, title: str) -> None:
         """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
@@ -237,8 +281,8 @@ class Outputs:
 
     def replay_log(self) -> FrameLog:
         """Return the file of the replay's frames; those of a run that goes on are in it."""
-        n_bytes = 0 if self.resumption is None else self.resumption.replay
-        return _naming_path(self.path(REPLAY_FRAMES), lambda path: FrameLog(path, n_bytes))
+        kept = FileSum() if self.resumption is None else self.resumption.replay
+        return _naming_path(self.path(REPLAY_FRAMES), lambda path: FrameLog(path, kept))
 
     def remove_passing_files(self) -> None:
         """Remove what only a run needs that goes on."""
@@ -256,7 +300,7 @@ class Outputs:
 
     def close(self) -> None:
         """Close the files that grow, and let another run have the folder. May be called twice."""
-        for file in (self._forces, *self._led.values()):
+        for file in self._growing_files:
             file.close()
         if self._reserve is not None:
             with contextlib.suppress(OSError):
@@ -274,10 +318,10 @@ class Outputs:
     ) -> None:
         self.close()
 
-    def _growing(self, name: str, columns: Sequence[str], n_kept: int = 0) -> GrowingFile:
-        """Begin a file that grows, or go on with so many of its bytes."""
+    def _growing(self, name: str, columns: Sequence[str], kept: FileSum = FileSum()) -> GrowingFile:
+        """Begin a file that grows, or go on with what is kept of it."""
         head = (",".join(columns) + "\n").encode("ascii")
-        return _naming_path(self.path(name), lambda path: GrowingFile(path, head, n_kept))
+        return _naming_path(self.path(name), lambda path: GrowingFile(path, head, kept))
 
     def _write_whole(self, name: str, write: Callable[[Path], object]) -> None:
         """Write a file that appears when it is whole."""
@@ -294,27 +338,15 @@ def _append(file: GrowingFile, rows: bytes) -> None:
     _naming_path(file.path, lambda _: file.append(rows))
 
 
-def _cut_back(file: GrowingFile, length: int | None, _: Path) -> None:
-    """Take off what was added to a file after it had this length."""
-    file.cut_back(length)
+def _cut_back(file: GrowingFile, mark: FileSum | None, _: Path) -> None:
+    """Take off what was added to a file after a mark."""
+    file.cut_back(mark)
 
 
 def _remove(path: Path) -> None:
     """Remove a file of an earlier run, and what is left of one that was killed while it wrote."""
     path.unlink(missing_ok=True)
     remove_unfinished(path)
-
-
-def _csv(rows: FloatArray) -> bytes:
-    """Return rows as lines of text with the fewest digits that give the same bits again.
-
-    JSON's numbers are those digits, and its encoder takes a fifth of the time of `repr`; it has no
-    word for what is not finite.
-    """
-    if np.isinf(rows).any():
-        return "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()).encode("ascii")
-    lines = msgspec.json.encode(rows.tolist())[2:-2].replace(b"],[", b"\n")
-    return lines.replace(b"null", b"nan") + b"\n"
 
 
 def check_folder(folder: Path) -> None:
@@ -345,49 +377,6 @@ def make_folder(folder: Path) -> None:
             file.write(b"can this folder be written?")
 
     _naming_path(folder, try_to_write)
-
-
-def check_file(path: Path, suffix: str, option: str) -> None:
-    """Make sure that a file can be written, before the work whose result it is for.
-
-    Args:
-        path: The file; one that is there will be overwritten.
-        suffix: What its name must end in.
-        option: The option that chose it, for the message.
-
-    Raises:
-        UsageError: another suffix, a folder, or a file in a folder that does not exist.
-        RunError: the system refuses.
-    """
-    if path.suffix.lower() != suffix:
-        raise UsageError(f"{option} is {path}; its name must end in {suffix}")
-    if path.is_dir() or not path.parent.is_dir():
-        reason = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
-        raise UsageError(f"{option} is {path}, and {reason}; choose another file")
-    is_new = not path.exists()
-    try:
-        with path.open("ab"):
-            pass
-        if is_new:
-            path.unlink()
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another {option}"
-        ) from error
-
-
-def summary_json(summary: Summary) -> str:
-    """Return the summary as JSON text."""
-    return json.dumps(_finite(summary._asdict()), indent=2, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    """Return a tree of JSON with null for each number that is not finite: JSON has no such."""
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _naming_path(path: Path, action: Callable[[Path], T]) -> T:

@@ -42,7 +42,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
     strokes = [given_in(stroke) for stroke in scene.strokes]
     for stroke in strokes:
         if "file" in stroke:
-            stroke["file"] = _relative(Path(stroke["file"]), folder)
+            stroke["file"] = relative_path(Path(stroke["file"]), folder)
     attachments = [given_in(attachment) for attachment in scene.attachments]
     graspers = [_grasper(grasper, folder) for grasper in scene.graspers]
     run = {} if scene.seconds is None else {"seconds": scene.seconds}
@@ -104,7 +104,7 @@ def _grasper(grasper: GrasperTable, folder: Path) -> dict[str, Any]:
         del given["motion"]  # it is empty
     for key in ("model", "recorded"):
         if key in given:
-            given[key] = _relative(Path(given[key]), folder)
+            given[key] = relative_path(Path(given[key]), folder)
     return given
 
 
@@ -119,7 +119,7 @@ def _arm(scene: Scene, folder: Path) -> dict[str, Any]:
     if scene.own_arm is None:
         return {"preset": scene.arm}
     found = _given(asdict(scene.own_arm))
-    found["model"] = _relative(Path(found["model"]), folder)
+    found["model"] = relative_path(Path(found["model"]), folder)
     return {key: value for key, value in found.items() if key not in ("pos", "quat")}
 
 
@@ -135,7 +135,7 @@ def _body(scene: Scene, folder: Path) -> dict[str, Any]:
     table = scene.mesh.table
     given = _given({key: getattr(table, key) for key in BodyTable.__struct_fields__})
     if table.file is not None:
-        given["file"] = _relative(scene.mesh.folder / table.file, folder)
+        given["file"] = relative_path(scene.mesh.folder / table.file, folder)
     return given | {"fixed": scene.fixed, "stretch": scene.stretch}
 
 
@@ -159,7 +159,7 @@ def _in_degrees(angle: float) -> float:
     return next((each for each in near if math.radians(each) == angle), degrees)
 
 
-def _relative(path: Path, folder: Path) -> str:
+def relative_path(path: Path, folder: Path) -> str:
     """Return a path seen from a folder, with slashes; as it is where they share no root."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()

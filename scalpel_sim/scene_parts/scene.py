@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -202,6 +203,13 @@ class Scene:
         for name in given:
             raise UsageError(f"--coupling-{name} is for --coupling virtual; a rigid one has none")
         return None
+
+    @property
+    def recorded_files(self) -> list[Path]:
+        """Files of motions that a hand did, which the scene repeats."""
+        strokes = [each.file for each in self.strokes if each.kind == "recorded"]
+        motions = [each.recorded for each in self.graspers]
+        return [Path(file) for file in (*strokes, *motions) if file is not None]
 
     def settings(self) -> dict[str, Any]:
         """Return the numbers and names of the scene, for a report."""

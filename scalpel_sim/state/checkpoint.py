@@ -3,14 +3,18 @@
 import hashlib
 import struct
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import msgspec
 
+from scalpel_sim.state.run_notes import RunMark, RunPlan
 from tissue import StateError
 
-_MAGIC = b"scalpel_sim checkpoint 1\n"
+_MAGIC = b"scalpel_sim checkpoint 2\n"
 """The first line of the file; its number rises where the form changes."""
+
+_WITHOUT_SUMS = b"scalpel_sim checkpoint 1\n"
+"""The first line of the form that had no checksums of the other files."""
 
 _DIGEST = 32
 """Length of the checksum [bytes]."""
@@ -21,16 +25,10 @@ _LENGTH = struct.Struct("<q")
 class CheckpointHead(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a checkpoint says beside the state."""
 
-    n_frames: int
-    """Frames that were done."""
-    replay: int
-    """How far the file of the replay's frames had got [bytes]."""
-    seconds: float | None
-    """How long the run is to last [s]; None: as long as what a hand did, which led it."""
-    exports: list[str]
-    """Files for the body's surface after the run."""
-    settings: dict[str, Any]
-    """What the summary says of the settings."""
+    plan: RunPlan
+    """What the run was asked for."""
+    mark: RunMark
+    """How far it had got."""
 
 
 class Checkpoint(NamedTuple):
@@ -53,6 +51,10 @@ class Checkpoint(NamedTuple):
         Raises:
             StateError: it is none, or is not whole.
         """
+        if data.startswith(_WITHOUT_SUMS):
+            raise StateError(
+                "an earlier version of the program wrote it, without checksums of the other files"
+            )
         begin = len(_MAGIC) + _DIGEST
         content = memoryview(data)[begin:]
         if not data.startswith(_MAGIC) or data[len(_MAGIC) : begin] != _digest(content):

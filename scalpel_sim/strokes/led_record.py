@@ -5,7 +5,7 @@ from pathlib import Path
 from tissue import whole_file
 
 
-def end_record(path: Path, t_end: float) -> None:
+def end_record(path: Path, t_end: float, n_bytes: int | None = None) -> None:
     """Cut off a last line that is not whole, and have the last pose last until a time.
 
     Until then the hand rested, or it would have left another row.
@@ -13,11 +13,13 @@ def end_record(path: Path, t_end: float) -> None:
     Args:
         path: `stroke.csv`, or the file of a grasper.
         t_end: Simulated time [s].
+        n_bytes: How much of it is kept [bytes]; None: all.
 
     Raises:
         OSError: the file cannot be read or written.
     """
-    lines = [line for line in path.read_text("ascii").splitlines(True) if line.endswith("\n")]
+    text = path.read_bytes()[:n_bytes].decode("ascii")
+    lines = [line for line in text.splitlines(True) if line.endswith("\n")]
     if len(lines) > 1:
         last, _, pose = lines[-1].partition(",")
         if float(last) < t_end:

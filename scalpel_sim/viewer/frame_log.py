@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from scalpel_sim.output.unnamed_file import unnamed_file
+from scalpel_sim.state.file_sum import FileSum
 from scalpel_sim.viewer.messages import SceneState
 
 _HEAD = struct.Struct("<dqq")
@@ -32,22 +33,22 @@ class FrameLog:
 
     Args:
         path: The file, which is gone on with if it is there; None: a temporary one.
-        n_bytes: How much of a file that is there is gone on with.
+        kept: How much of a file that is there is gone on with.
 
     Raises:
         OSError: the file cannot be made, or is shorter.
     """
 
-    def __init__(self, path: Path | None = None, n_bytes: int = 0) -> None:
+    def __init__(self, path: Path | None = None, kept: FileSum = FileSum()) -> None:
         self.path = path
         """Where it is; None: it has no name."""
-        mode = "r+b" if n_bytes else "w+b"
+        mode = "r+b" if kept.n_bytes else "w+b"
         self._file = unnamed_file() if path is None else path.open(mode, buffering=0)
-        self.n_bytes = 0
-        """Its length."""
-        if self._file.seek(0, 2) < n_bytes:
-            raise OSError(f"{path} has fewer than {n_bytes} bytes: a part of it is missing")
-        self.cut_back(n_bytes)
+        self.sum = kept
+        """Its length and checksum."""
+        if self._file.seek(0, 2) < kept.n_bytes:
+            raise OSError(f"{path} has fewer than {kept.n_bytes} bytes: a part of it is missing")
+        self.cut_back(kept)
 
     def add(self, time: float, state: SceneState) -> LoggedFrame:
         """Add a frame.
@@ -57,18 +58,19 @@ class FrameLog:
         """
         content = _encoder.encode(state)
         n_triangles = len(state.surface.triangles)
-        data = memoryview(_HEAD.pack(time, n_triangles, len(content)) + content)
-        self._file.seek(self.n_bytes)
-        while data:
-            data = data[self._file.write(data) :]
-        begin = self.n_bytes + _HEAD.size
-        self.n_bytes = begin + len(content)
+        data = _HEAD.pack(time, n_triangles, len(content)) + content
+        begin = self.sum.n_bytes + _HEAD.size
+        self._file.seek(self.sum.n_bytes)
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+        self.sum = self.sum.after(data)
         return LoggedFrame(time, n_triangles, begin, len(content))
 
     def frames(self) -> list[LoggedFrame]:
         """Return where all frames are."""
         found, begin = [], 0
-        while begin < self.n_bytes:
+        while begin < self.sum.n_bytes:
             self._file.seek(begin)
             time, n_triangles, n_bytes = _HEAD.unpack(self._file.read(_HEAD.size))
             found.append(LoggedFrame(time, n_triangles, begin + _HEAD.size, n_bytes))
@@ -80,10 +82,10 @@ class FrameLog:
         self._file.seek(frame.begin)
         return _decoder.decode(self._file.read(frame.n_bytes))
 
-    def cut_back(self, n_bytes: int) -> None:
-        """Forget what comes after so many bytes."""
-        self._file.truncate(n_bytes)
-        self.n_bytes = n_bytes
+    def cut_back(self, mark: FileSum) -> None:
+        """Forget what was added after `sum` was this."""
+        self._file.truncate(mark.n_bytes)
+        self.sum = mark
 
     def close(self) -> None:
         """Close the file, which stays where it has a name. May be called twice."""

@@ -11,6 +11,7 @@ import mujoco
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError
+from scalpel_sim.state.file_sum import FileSum
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
 from scalpel_sim.viewer.messages import NO_VALUES, SceneState
@@ -144,11 +145,11 @@ class ReplayWriter:
         for frame in self._log.frames():
             self._keep(frame)
 
-    def mark(self) -> int:
-        """Return how far the file of the frames has got [bytes]."""
-        return self._log.n_bytes
+    def mark(self) -> FileSum:
+        """Return how far the file of the frames has got."""
+        return self._log.sum
 
-    def cut_back(self, mark: int) -> None:
+    def cut_back(self, mark: FileSum) -> None:
         """Forget the frames that were added after a mark."""
         self._log.cut_back(mark)
         self._last = None

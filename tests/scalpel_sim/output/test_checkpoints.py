@@ -6,13 +6,16 @@ import pytest
 
 from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
 from scalpel_sim.state.checkpoint import Checkpoint, CheckpointHead, read_checkpoint
+from scalpel_sim.state.file_sum import FileSum
+from scalpel_sim.state.run_notes import RunMark, RunPlan
 from tissue import StateError
 
 
 def checkpoint(n_frames, n_bytes=1000):
     """Return a checkpoint whose state is so long."""
-    head = CheckpointHead(n_frames, 10 * n_frames, 1.5, ["/a.stl"], {"young": 1e4})
-    return Checkpoint(head, bytes([n_frames % 256]) * n_bytes)
+    plan = RunPlan(1e-3, "name = 'slab'", ["/a.stl"], {"young": 1e4})
+    mark = RunMark(n_frames, 1.5, {"forces.csv": FileSum(10 * n_frames, 7)})
+    return Checkpoint(CheckpointHead(plan, mark), bytes([n_frames % 256]) * n_bytes)
 
 
 def written(folder, *n_frames, every=100):
@@ -27,7 +30,7 @@ def written(folder, *n_frames, every=100):
 def frames_in(folder):
     """Return the frames of the checkpoints in a folder, the last one first."""
     with Checkpoints(folder) as checkpoints:
-        return [each.head.n_frames for each in checkpoints.read()]
+        return [each.head.mark.n_frames for each in checkpoints.read()]
 
 
 def test_a_checkpoint_is_read_as_it_was_written():

@@ -35,7 +35,7 @@ def test_a_disk_that_gets_full_takes_whole_rows_and_the_rest_is_kept(tmp_path, r
         file.append(ROWS)
         file.append(ROWS)
     assert file.path.read_bytes() == HEAD + (ROWS if room >= len(HEAD + ROWS) else b"")
-    n_before = file.length
+    n_before = file.sum.n_bytes
     file.append(b"5,6\n")
     kept = ROWS if n_before == len(HEAD + ROWS) else ROWS + ROWS
     assert file.path.read_bytes() == HEAD + kept + b"5,6\n"
@@ -44,8 +44,8 @@ def test_a_disk_that_gets_full_takes_whole_rows_and_the_rest_is_kept(tmp_path, r
 def test_a_file_is_cut_back_to_an_earlier_length_whether_it_was_written_or_not(tmp_path):
     file = GrowingFile(tmp_path / "a.csv", HEAD)
     file.append(ROWS)
-    mark = file.length
-    with most_bytes_in_a_file(mark), pytest.raises(OSError, match="large"):
+    mark = file.sum
+    with most_bytes_in_a_file(mark.n_bytes), pytest.raises(OSError, match="large"):
         file.append(b"5,6\n")
     file.cut_back(mark)
     file.append(b"7,8\n")

@@ -24,9 +24,8 @@ from scalpel_sim.output.run_folder import (
     PLOT,
     SUMMARY,
     Outputs,
-    summary_json,
 )
-from scalpel_sim.output.summary import RunFacts, Summary, summarise
+from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_json
 from tests.run_files import names_in
 from tissue import CutReport, Energies, MeshMeasures, Snapshot, block, pieces_of
 
