@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.asked_area import asked_area, first_areas
 from scalpel_sim.strokes.incision import DEPTH, INSERTED_AT, SLOPE, WITHDRAWN_AT, plan_incision
 from scalpel_sim.strokes.planning import plan_stroke
-from tissue import MATERIALS, Snapshot, TetrahedralMesh, block
+from scalpel_sim.strokes.scene_stroke import stroke_through
+from scalpel_sim.tables.stroke import StrokeTable
+from tissue import MATERIALS, Material, Snapshot, TetrahedralMesh, block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
 
@@ -65,3 +67,35 @@ def test_a_press_and_a_stop_do_not_say_and_a_miss_asks_for_nothing():
     assert asked_area(planned("stop", body), body) is None
     away = lying(SLAB, SLAB.positions + np.array([1.0, 0.0, 0.0]))
     assert asked_area(planned("straight", body), away) == 0.0
+
+
+def along(x, depth, back=False):
+    """An upright edge that is led through the slab at a place along x, so deep [m]."""
+    points = [[x, -0.01, 0.04 - depth], [x, 0.07, 0.04 - depth]]
+    return StrokeTable(kind="points", points=points[::-1] if back else points, length=0.06)
+
+
+@pytest.mark.parametrize(
+    ("second", "area"),
+    [
+        (along(0.021, 0.02), 0.0),  # the same again
+        (along(0.021, 0.02, back=True), 0.0),
+        (along(0.0215, 0.03), 0.06 * 0.01),  # deeper
+        (along(0.031, 0.02), 0.06 * 0.02),  # beside it
+    ],
+)
+def test_what_is_passed_twice_is_asked_for_once(second, area):
+    body = lying(SLAB)
+    stroke = stroke_through(SLAB, [along(0.021, 0.02), second], Material())
+    near = 1e-3
+    (_, one), (_, other) = first_areas(stroke, body, near)
+    assert one == pytest.approx(0.06 * 0.02, rel=0.02)
+    assert other == pytest.approx(area, abs=2 * near * 0.06)
+
+
+@pytest.mark.parametrize("name", ["straight", "slanted", "curved", "incision"])
+def test_a_single_stroke_asks_for_all_of_its_area_for_the_first_time(name):
+    body = lying(SLAB)
+    stroke = planned(name, body)
+    ((_, area),) = first_areas(stroke, body, 3e-3)
+    assert area == pytest.approx(asked_area(stroke, body), rel=1e-9)
