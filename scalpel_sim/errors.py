@@ -7,6 +7,7 @@ EXIT_OK = 0
 EXIT_RUN_FAILED = 1
 EXIT_WRONG_USE = 2
 EXIT_CHECK_FAILED = 3
+EXIT_WARNED = 4
 
 
 class UsageError(ValueError):
@@ -19,6 +20,10 @@ class RunError(RuntimeError):
 
 class CheckError(RunError):
     """A validation ran to its end, and a check is out of its bounds. Exit code 3."""
+
+
+class WarnedError(RunError):
+    """A run that was to be without warnings ended with some. Exit code 4."""
 
 
 class Interrupted(RunError):
@@ -41,8 +46,10 @@ def exit_code(error: BaseException) -> int:
     """Return the exit code for an error that reached the command line.
 
     All parts of the project raise a `ValueError` for a wrong argument; every other error means that
-    the run failed, or a check of a validation.
+    the run failed, a check of a validation did, or it ended with warnings.
     """
+    if isinstance(error, WarnedError):
+        return EXIT_WARNED
     if isinstance(error, CheckError):
         return EXIT_CHECK_FAILED
     return EXIT_WRONG_USE if isinstance(error, ValueError) else EXIT_RUN_FAILED

@@ -96,6 +96,7 @@ def prepare(
         passivity=scene.passivity,
     )
     simulation.workspace = stands.room
+    simulation.expected_force = needed.force
     if scene.graspers:
         _add_graspers(simulation, scene.graspers, motions)
     return simulation

@@ -203,7 +203,7 @@ def _begin(
         outputs.keep_reserve()
     # What graspers move is elsewhere when the blade comes.
     asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
-    return RunStart(body, title, asked)
+    return RunStart(body, title, at_first, asked)
 
 
 def _run_frames(

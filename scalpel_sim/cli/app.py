@@ -9,7 +9,13 @@ from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
-from scalpel_sim.cli.console import log_to_stderr, print_report, say, say_error
+from scalpel_sim.cli.console import (
+    expect_no_warnings,
+    log_to_stderr,
+    print_report,
+    say,
+    say_error,
+)
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
     CONNECTION,
@@ -49,7 +55,7 @@ app = App(
     suppress_keyboard_interrupt=False,  # `command_line` says what happened
     help="A MuJoCo robot arm holds a scalpel, cuts soft tissue for real, and feels it.\n\n"
     "Exit codes: 0 done, 1 the run failed or was interrupted, 2 wrong use or bad input, 3 a "
-    "check of a validation failed.",
+    "check of a validation failed, 4 a run with --strict ended with warnings.",
 )
 
 
@@ -100,6 +106,7 @@ def _run(
             check_device_options(device, is_led=False)
             summary, resumed = perform_resumed(output.resume, options, plotter)
             print_report(summary, resumed.folder, output.export, printing)
+            expect_no_warnings(summary, output)
             return
         check_device_options(device, is_led=is_led)
         relaxation = "verlet" if is_led else None
@@ -112,6 +119,7 @@ def _run(
             else:
                 summary = perform_script(prepared, options, plotter)
             print_report(summary, prepared.folder, output.export, printing)
+        expect_no_warnings(summary, output)
 
 
 app.command(view)

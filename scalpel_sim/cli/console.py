@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scalpel_sim.cli.options import PrintOptions
+from scalpel_sim.cli.options import PrintOptions, RunOutputOptions
+from scalpel_sim.errors import WarnedError
 from scalpel_sim.stop_signals import StopSignals
 
 if TYPE_CHECKING:  # an error of use should be printed without waiting for a compiler
@@ -145,6 +146,19 @@ def print_report(
         print(f"files in {folder}: {', '.join(names)}")
         if exports:
             print(f"exported: {', '.join(map(str, exports))}")
+
+
+def expect_no_warnings(summary: "Summary", options: RunOutputOptions) -> None:
+    """Check that a run ended without warnings, if that is asked for.
+
+    Raises:
+        WarnedError: it did not; the message names their kinds.
+    """
+    kinds = [warning["kind"] for warning in summary.warnings]
+    if options.strict and kinds:
+        raise WarnedError(
+            f"the run ended with a warning, and --strict is given: {', '.join(kinds)}"
+        )
 
 
 def stay_while(

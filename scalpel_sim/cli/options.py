@@ -252,12 +252,15 @@ class OutputOptions:
 @Parameter(name="*", group=OUTPUT)
 @dataclass(frozen=True)
 class RunOutputOptions(OutputOptions):
-    """The files that a run writes, or has written."""
+    """The files that a run writes, or has written, and how it ends."""
 
     resume: Path | None = None
     """Go on with the run that was interrupted, or killed, while it wrote to this folder, to the
     same bits. What is asked for is in the folder: give no other options than --export,
-    --checkpoint, and what is printed."""
+    --checkpoint, --strict, and what is printed."""
+    strict: Flag = False
+    """End with exit code 4 where the run ended with a warning: a cut that is unfinished, a blade
+    that is still in the tissue, an account that does not close."""
 
 
 @Parameter(name="*", group=OUTPUT)

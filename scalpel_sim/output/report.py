@@ -88,6 +88,8 @@ def print_summary(summary: Summary, console: Console) -> None:
     _add_counters(rows, summary.counters)
     _add_times(rows, summary)
     console.print(rows.table)
+    if summary.warnings:
+        console.print(_warnings(summary.warnings))
     if summary.energies_j is not None:
         console.print(_account(summary.energies_j, summary.residual_of_work))
 
@@ -246,6 +248,16 @@ def _account(energies: dict[str, float], residual_of_work: float | None) -> Tabl
         if energies[term.name]:
             row(term.label, energies[term.name], energies[term.name] / work if work else None)
     row("not accounted for", energies["residual"], residual_of_work)
+    return table
+
+
+def _warnings(warnings: list[dict[str, Any]]) -> Table:
+    """Return what the run was asked for and did not do as a table."""
+    table = Table(title="warnings", title_justify="left", show_header=False, show_lines=True)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for warning in warnings:
+        table.add_row(warning["kind"], warning["message"])
     return table
 
 

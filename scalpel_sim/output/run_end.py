@@ -9,11 +9,13 @@ from scalpel_sim.errors import RunError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_folder import FINAL, FORCES, PLOT, REPLAY, SUMMARY, Outputs
+from scalpel_sim.output.run_outcome import outcome_of
+from scalpel_sim.output.run_warnings import RunWarning, warnings_of
 from scalpel_sim.output.summary import RunFacts, Summary, summarise
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.pictures import add_to
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import pieces_of
+from tissue import Snapshot, pieces_of
 
 _log = logging.getLogger(__name__)
 
@@ -26,6 +28,8 @@ class RunStart(NamedTuple):
     body: TissueDescription
     title: str
     """Heading of the plots."""
+    first: Snapshot
+    """The body as it lies then."""
     asked: float | None
     """The area that the stroke is to cut [m2]; None where that is not known."""
 
@@ -104,6 +108,8 @@ def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
     summary = summarise(simulation.recording, _facts(run, attempts))
     with attempts.of(SUMMARY):
         outputs.write_summary(summary)
+    for warning in summary.warnings:
+        _log.warning("%s", warning["message"])
     with attempts.of(PLOT):
         outputs.start_plots(run.start.title)  # by another process, while this one writes the replay
     with attempts.of("the last picture"):
@@ -139,14 +145,19 @@ def write_led(outputs: Outputs, hand: LedHand) -> None:
 def _facts(run: EndedRun, attempts: Attempts) -> RunFacts:
     """Write the final mesh, and return the facts of the run."""
     simulation, link, bridge = run.simulation, run.simulation.link, run.simulation.bridge
-    pieces = quality = None
+    last = pieces = quality = None
     with attempts.of(FINAL):
-        end = link.snapshot()
-        run.outputs.write_mesh(FINAL, end)
-        pieces = pieces_of(end)
+        last = link.snapshot()
+        run.outputs.write_mesh(FINAL, last)
+        pieces = pieces_of(last)
     if FINAL not in attempts.unwritten:
         with attempts.of("the quality of the cut"):
             quality = link.cut_report()
+    warnings: list[RunWarning] = []
+    if last is not None and quality is not None:
+        with attempts.of("the warnings"):
+            known = run.settings, run.start.body, run.start.first
+            warnings = warnings_of(outcome_of(simulation, *known, last, quality.node_size))
     return RunFacts(
         scene=run.start.body.scene,
         status=run.status,
@@ -161,6 +172,7 @@ def _facts(run: EndedRun, attempts: Attempts) -> RunFacts:
         touched=simulation.touching.frames,
         settings=run.settings,
         held_points=[load.n_points for load in bridge.frame_loads],
+        warnings=[warning.as_numbers() for warning in warnings],
     )
 
 

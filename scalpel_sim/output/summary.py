@@ -77,6 +77,8 @@ class Summary(NamedTuple):
     """Counters of the bridge: broad-phase rejections, saturations and others."""
     touched: dict[str, int]
     """In how many frames a part of the arm collided, by "PART, FIXTURE OR PART"."""
+    warnings: list[dict[str, Any]]
+    """What the run was asked for and did not do: `kind`, `message`, and the figures of the kind."""
     settings: dict[str, Any]
     """The resolved settings of the run: material, stroke, arm."""
     versions: dict[str, str]
@@ -108,6 +110,8 @@ class RunFacts(NamedTuple):
     """The resolved settings of the run."""
     held_points: Sequence[int] = ()
     """Number of points that each attachment holds at the end."""
+    warnings: Sequence[dict[str, Any]] = ()
+    """What is to be said of the run: see `scalpel_sim.output.run_warnings`."""
 
 
 def summarise(recording: Recording, facts: RunFacts) -> Summary:
@@ -147,6 +151,7 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         share=shares(recording, facts.wall_seconds),
         counters=facts.counters,
         touched=facts.touched,
+        warnings=list(facts.warnings),
         settings=facts.settings,
         versions=versions(),
     )

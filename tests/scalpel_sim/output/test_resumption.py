@@ -70,6 +70,14 @@ def test_no_more_than_the_rows_of_a_flush_are_lost(tmp_path):
     assert resumption_of(tmp_path).n_frames >= 100
 
 
+def test_a_run_that_goes_on_ends_with_the_warnings_of_one_that_was_not_killed(tmp_path):
+    free = changed(SCENES["grid2"], fixed="none", table=0.0)  # the blade pushes it along
+    expected = perform_in(tmp_path / "whole", free).warnings
+    kill_in(tmp_path / "killed", free, 900)
+    assert resume_in(tmp_path / "killed").warnings == expected
+    assert [warning["kind"] for warning in expected] == ["unfinished_cut"]
+
+
 def test_a_complete_run_leaves_no_checkpoint(whole):
     assert {path.name for path in whole.iterdir()} & set(PASSING_FILES) == set()
     with pytest.raises(UsageError, match="that run is complete"):

@@ -1,0 +1,241 @@
+"""What a run was asked for and what came of it: the figures that warnings are made from."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from bridge import TissueDescription, TissueFrame
+from scalpel_sim.output.recording import Recording
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.strokes.asked_area import first_areas
+from scalpel_sim.strokes.asked_pieces import asked_pieces, n_large
+from scalpel_sim.strokes.expected_force import length_inside
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import (
+    FloatArray,
+    Snapshot,
+    TetrahedralMesh,
+    boundary_faces,
+    components,
+    pieces_of,
+    toughness_law_of,
+)
+
+_SAME_PLACE = 0.5
+"""Distance within which a cut goes where one has gone before, in node sizes: it snaps to nodes that
+are nearer than 0.3."""
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """A run that has ended, whose tissue can still be asked. Lengths in metres, tissue frame."""
+
+    recording: Recording
+    dt: float
+    """Simulated time of a frame [s]."""
+    stroke: Stroke
+    """Where the blade was to go."""
+    frame: TissueFrame
+    """Where the tissue lies in the world."""
+    settings: dict[str, Any]
+    """What the command line and the scene resolved to; of a tissue elsewhere some are missing."""
+    tissue: TissueDescription
+    """What is known of the tissue, wherever it is."""
+    first: Snapshot
+    """The body before the first frame."""
+    last: Snapshot
+    """The body at the end."""
+    node_size: float
+    """Mean size of a node [m]."""
+    expected_force: float | None = None
+    """What the cut takes if the body does not give way [N]; None where that is not known."""
+    counters: dict[str, Any] = field(default_factory=dict)
+    """Counters of the bridge."""
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time [s]."""
+        return len(self.recording) * self.dt
+
+    @property
+    def is_stroke_over(self) -> bool:
+        """Whether the run reached the end of a stroke that a script asks for.
+
+        One that ends before, as `seconds` may ask, is not judged by what the stroke was to do; nor
+        is a hand.
+        """
+        return not self.stroke.is_led and self.seconds >= self.stroke.duration
+
+    @property
+    def is_body_moved(self) -> bool:
+        """Whether the scene moves the body: then it is elsewhere when the blade comes."""
+        if self.recording.hands:
+            return True
+        if "attachments" not in self.settings:  # the tissue is elsewhere, and they may move it
+            return self.recording.n_held > 0
+        moves = {"displacements", "release_at", "breaks_at"}
+        return any(moves & each.keys() for each in self.settings["attachments"])
+
+    @cached_property
+    def asked_areas(self) -> list[tuple[float, float]]:
+        """Start [s] and area [m2] of each cut that was to be done, as far as is known."""
+        if self.is_body_moved or self.stroke.is_led:
+            return []
+        return first_areas(self.stroke, self.first, _SAME_PLACE * self.node_size) or []
+
+    @cached_property
+    def asked_pieces(self) -> int | None:
+        """Number of pieces that were to be left, crumbs left out; None: not known."""
+        if self.is_body_moved or self.stroke.is_led:
+            return None
+        return asked_pieces(self.stroke, self.first, self.node_size)
+
+    @cached_property
+    def n_pieces(self) -> int:
+        """Number of pieces, crumbs left out."""
+        volumes = np.array([piece.rest_volume for piece in pieces_of(self.last)])
+        return n_large(volumes, self.node_size)
+
+    @property
+    def was_to_cut(self) -> bool:
+        """Whether the stroke says that it cuts, wherever the body is then."""
+        kinds = [each["kind"] for each in self.settings.get("strokes", ())]
+        return bool(self.stroke.asked) or "stop" in kinds
+
+    def cut_between(self, start: float, end: float) -> float:
+        """Return the area that was cut between two instants [m2]."""
+        areas = self.recording.column("cut_area_m2")
+        before, after = (areas[: round(t / self.dt)] for t in (start, end))
+        return float((after[-1] if len(after) else 0.0) - (before[-1] if len(before) else 0.0))
+
+    @property
+    def edge_inside(self) -> float:
+        """Length of the edge that is in the tissue at the end [m]."""
+        return self.recording.at_end("anchored_length_m")
+
+    @property
+    def force_at_end(self) -> float:
+        """Force on the blade at the end [N]."""
+        return float(np.linalg.norm([self.recording.at_end(f"force_{axis}_n") for axis in "xyz"]))
+
+    @cached_property
+    def is_to_end_inside(self) -> bool:
+        """Whether the stroke ends in the body, if that lies as it did at first."""
+        mesh = TetrahedralMesh(self.first.positions, self.first.tetrahedra)
+        corners = mesh.positions[boundary_faces(mesh.tetrahedra)]
+        return length_inside(self.stroke.pose(self.stroke.duration), mesh, corners) > 0.0
+
+    @cached_property
+    def motion(self) -> tuple[float, float]:
+        """How far the body has moved [m] and turned [rad] as a rigid one: its largest piece."""
+        n, last = len(self.first.positions), self.last
+        ends = np.stack([np.repeat(last.tetrahedra[:, 0], 3), last.tetrahedra[:, 1:].ravel()], 1)
+        _, label = components(len(last.positions), ends)
+        kept = np.flatnonzero(label[:n] == np.bincount(label[:n]).argmax())
+        masses = self.first.masses[kept, None] / self.first.masses[kept].sum()
+        before, after = self.first.positions[kept], last.positions[kept]
+        centres = (masses * before).sum(axis=0), (masses * after).sum(axis=0)
+        # Kabsch 1976, Acta Cryst. A32:922.
+        left, _, right = np.linalg.svd((masses * (before - centres[0])).T @ (after - centres[1]))
+        mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+        cosine = 0.5 * (float(np.trace(left @ mirror @ right)) - 1.0)
+        return float(np.linalg.norm(centres[1] - centres[0])), float(np.arccos(min(cosine, 1.0)))
+
+    @property
+    def motion_of_supports(self) -> float:
+        """How far the fixed nodes have moved on average [m]; 0 where there are none."""
+        held = np.flatnonzero(self.first.fixed)
+        if not len(held):
+            return 0.0
+        moved = (self.last.positions[held] - self.first.positions[held]).mean(axis=0)
+        return float(np.linalg.norm(moved))
+
+    @cached_property
+    def forward_in_tissue(self) -> float:
+        """How far the edge went forward with tissue on it [m]."""
+        tips = self.frame.points_to_tissue(self.recording.vector("tip"))
+        ahead = (np.diff(tips, axis=0) * self.forwards[1:]).sum(axis=1)
+        is_in = self.recording.column("anchored_length_m")[1:] > 0.0
+        return float(np.maximum(ahead[is_in], 0.0).sum())
+
+    @cached_property
+    def forwards(self) -> FloatArray:
+        """Direction in which the edge was to cut at the end of each frame, shape (n_frames, 3)."""
+        times = self.recording.column("time_s") + self.dt
+        return np.array([self.stroke.pose(t).forward for t in times.tolist()]).reshape(-1, 3)
+
+    @property
+    def distance_behind(self) -> float:
+        """How far the tip is from where it was to be at the end [m]."""
+        tip = np.array([self.recording.at_end(f"tip_{axis}_m") for axis in "xyz"])
+        planned = self.stroke.pose(self.seconds).tip
+        return float(np.linalg.norm(self.frame.points_to_tissue(tip) - planned))
+
+    @cached_property
+    def friction_of_table(self) -> float | None:
+        """The most that friction with the table held the body with [N]; None where more held it.
+
+        Its normal force is the weight, and what the blade pushed down when it pulled hardest.
+        """
+        settings = self.settings
+        others = self.first.fixed.any() or self.recording.hands or self.recording.n_held
+        if settings.get("table") is None or "gravity" not in settings or others:
+            return None
+        given = settings.get("table_friction")
+        friction = self.tissue.material.friction if given is None else given
+        force = self.recording.vector("tissue_force")
+        hardest = int(np.linalg.norm(force[:, :2], axis=1).argmax())
+        corners = self.first.rest_positions[self.first.tetrahedra]
+        volume = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum()) / 6.0
+        weight = self.tissue.material.density * volume * settings["gravity"]
+        return float(friction * max(weight + float(force[hardest, 2]), 0.0))
+
+    @cached_property
+    def toughness(self) -> FloatArray | None:
+        """Energy per area at the speed of the edge in each frame [J/m2]; None: not known."""
+        law = toughness_law_of(self.tissue.material, self.tissue.blade)
+        slow = np.full(len(self.recording), law.toughness)
+        if law.exponent == 0.0:
+            return slow
+        if self.stroke.is_led:
+            return None
+        times = self.recording.column("time_s")
+        middles = [self.stroke.pose(t) for t in [*times.tolist(), self.seconds]]
+        ways = np.diff([0.5 * (pose.tip + pose.heel) for pose in middles], axis=0)
+        speeds = np.maximum((ways * self.forwards).sum(axis=1), 0.0) / self.dt
+        return np.asarray(slow * (1.0 + (speeds / law.doubling_speed) ** law.exponent))
+
+
+def outcome_of(
+    simulation: Simulation,
+    settings: dict[str, Any],
+    tissue: TissueDescription,
+    first: Snapshot,
+    last: Snapshot,
+    node_size: float,
+) -> RunOutcome:
+    """Return what came of a run.
+
+    Args:
+        simulation: After its last frame.
+        settings: What the command line and the scene resolved to.
+        tissue: What is known of the tissue.
+        first: The body before the first frame.
+        last: The body at the end.
+        node_size: Mean size of a node [m].
+    """
+    return RunOutcome(
+        recording=simulation.recording,
+        dt=simulation.dt,
+        stroke=simulation.stroke,
+        frame=simulation.frame,
+        settings=settings,
+        tissue=tissue,
+        first=first,
+        last=last,
+        node_size=node_size,
+        expected_force=simulation.expected_force,
+        counters=simulation.bridge.counters.as_numbers(),
+    )
