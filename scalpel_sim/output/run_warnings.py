@@ -232,10 +232,11 @@ def _reasons(outcome: RunOutcome) -> tuple[str, dict[str, float]]:
             f"friction with the table holds it with {friction:.2g} N, and the cut needs "
             f"{needed:.2g} N"
         )
+    limited = outcome.counters.get("force_limited", 0)
+    if limited:
+        found.append(f"the force was above the limit of the arm in {limited:,} frames")
     if _is_moved(outcome, behind):
-        limited = outcome.counters.get("force_limited", 0)
-        limit = f"; its force was limited in {limited:,} frames" if limited else ""
-        found.append(f"the blade is {_mm(behind)} from where it was to end{limit}")
+        found.append(f"the blade is {_mm(behind)} from where it was to end")
     figures = {
         "body_moved_m": moved,
         "body_turned_rad": turned,
@@ -244,6 +245,7 @@ def _reasons(outcome: RunOutcome) -> tuple[str, dict[str, float]]:
         "edge_inside_m": outcome.edge_inside,
         "force_at_end_n": outcome.force_at_end,
         "blade_off_m": behind,
+        "force_limited_frames": limited,
     }
     if friction is not None and needed is not None:
         figures |= {"friction_of_table_n": friction, "expected_force_n": needed}

@@ -128,6 +128,11 @@ def test_a_free_block_that_is_pushed_along_says_by_how_much_and_why():
         assert re.search(words, warning.message)
 
 
+def test_an_arm_at_its_limit_is_a_reason():
+    limited = replace(pushed(), counters={"force_limited": 12})
+    assert "above the limit of the arm in 12 frames" in only_warning(limited).message
+
+
 def test_enough_friction_is_not_a_reason():
     held = replace(pushed(), settings=pushed().settings | {"table_friction": 20.0})
     assert "friction" not in only_warning(held).message
