@@ -37,7 +37,7 @@ from tissue.input_checks import (
     warn_of_toughness,
 )
 from tissue.integrators.equilibrium import SETTLED, settle
-from tissue.integrators.equilibrium_checks import expect_support, warn_of_motion
+from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.options import Hierarchical
@@ -236,14 +236,13 @@ class Tissue(RepeatedSteps):
         self._loads.spread(system.body, system.stages.loads)
         self._attachments.stop(system.body)
         system.geoms.stop()
-        if not (self._attachments.act or system.geoms.geoms):
-            expect_support(system, self.floor)
-        found = settle(self._global_stepper, system, NOWHERE)
+        support = support_of(system, self.material, self.floor)
+        found = settle(self._global_stepper, system, NOWHERE, support)
         self._integrator.body_moved(system.body)
         if found.is_at_rest:
             self._global_stepper.let_rest(system)
         else:
-            warn_of_motion(system, found.n_steps, found.accelerations, SETTLED)
+            warn_of_motion(system, found.n_steps, found.accelerations, support, SETTLED)
         write_bounds(system.body, self._bounds)
         self._audit.begin(self._system, NOWHERE)
         return found.n_steps

@@ -14,7 +14,7 @@ from tissue.blade.edge import Edge
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.strained_frequency import StepLimit
-from tissue.integrators.equilibrium_checks import fastest_node
+from tissue.integrators.equilibrium_checks import SupportConditions, fastest_node, gone_too_far
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
@@ -75,13 +75,16 @@ class Settling(NamedTuple):
     """Accelerations of its nodes at the end [m/s2], shape (n_nodes, 3)."""
 
 
-def settle(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
+def settle(
+    stepper: GlobalStepper, system: System, edge: Edge, support: SupportConditions
+) -> Settling:
     """Relax to equilibrium. Supports that move stop.
 
     Args:
         stepper: Moves all nodes.
         system: Body, forces and contact; the loads are in its stages.
         edge: The edge of no blade.
+        support: What the body comes to rest on, for what is said where it does not.
 
     Raises:
         TissueError: a part of the body is held by nothing, the motion became unstable, or it is
@@ -96,23 +99,24 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
         return Settling(0, True, np.zeros((n, 3)))
     try:
         with system.without_drag():
-            return _relax(stepper, system, edge)
+            return _relax(stepper, system, edge, support)
     except TissueError as error:
         body.positions[:n] = begin
         velocities[:] = 0.0
         if isinstance(error, UnstableError):
             raise TissueError(
-                f"the body cannot come to rest: {error.fault}. Less gravity, load or stretch, or a "
-                "stiffer material, may help"
+                f"the body cannot come to rest: {error.fault}: {support.remedy}"
             ) from error
         raise
 
 
-def _relax(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
+def _relax(
+    stepper: GlobalStepper, system: System, edge: Edge, support: SupportConditions
+) -> Settling:
     """Move the nodes until they are at rest, or for `LONGEST_SETTLING` steps."""
     body, n, rate = system.body, system.body.n_nodes, 0.0
     masses = body.masses[:n, None] * ~body.fixed[:n, None]
-    watch, before = _Watch(system), np.zeros((n, 3))
+    watch, before = _Watch(system, support), np.zeros((n, 3))
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_LOOKS):
         positions_t0 = body.positions[:n].copy()
         look = _take_steps(stepper, system, edge, rate)
@@ -127,7 +131,8 @@ def _relax(stepper: GlobalStepper, system: System, edge: Edge) -> Settling:
             _disturb(system)
     fastest = fastest_node(system, before)
     if fastest.acceleration > RESTLESS:
-        raise TissueError(f"the body cannot come to rest: {fastest.described(LONGEST_SETTLING)}")
+        described = fastest.described(LONGEST_SETTLING, support)
+        raise TissueError(f"the body cannot come to rest: {described}")
     return Settling(LONGEST_SETTLING, False, before)
 
 
@@ -196,10 +201,11 @@ class _Watch:
 
     Args:
         system: The body where it begins.
+        support: What it comes to rest on.
     """
 
-    def __init__(self, system: System) -> None:
-        self._system = system
+    def __init__(self, system: System, support: SupportConditions) -> None:
+        self._system, self._support = system, support
         self._begin = self._kept = self._positions.copy()
         self._farthest = FARTHEST_HELD * float(np.linalg.norm(np.ptp(self._begin, axis=0)))
         self._n_quiet = 0
@@ -251,15 +257,9 @@ class _Watch:
         """Refuse a body of which a part is far away.
 
         Raises:
-            TissueError: it is, and nothing holds it.
+            TissueError: it is.
         """
         ways = np.linalg.norm(self._positions - self._begin, axis=1)
         node = int(ways.argmax())
         if ways[node] > self._farthest:
-            x, y, z = self._begin[node]
-            raise TissueError(
-                f"the body cannot come to rest: node {node}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, has "
-                f"gone {ways[node]:.3g} m and goes on. Nothing holds the piece that it belongs to "
-                "against its weight and its loads: fix nodes of it, put a floor below it, or take "
-                "gravity and loads away"
-            )
+            raise gone_too_far(self._system, node, self._begin[node], self._support)

@@ -1,12 +1,16 @@
 """Whether a body can come to rest, and what to say where it did not."""
 
 import logging
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.integrators.own_weight import OwnWeight, expect_bearable, own_weight
 from tissue.integrators.system import System
+from tissue.material import Material
+from tissue.mesh.loose_pieces import loose_pieces_of
 from tissue.types import TissueError
 
 BALANCED = 1e-9
@@ -16,15 +20,48 @@ rounding."""
 _log = logging.getLogger("tissue")
 
 
-def expect_support(system: System, floor: float | None) -> None:
-    """Refuse a body that nothing can hold against its weight and its loads.
+class SupportConditions(NamedTuple):
+    """What a body comes to rest on, and what it weighs."""
+
+    floor: float | None
+    """Height of the floor below it [m], or None."""
+    weight: OwnWeight | None
+    """Its weight against its stiffness; None where that is no matter."""
+
+    @property
+    def remedy(self) -> str:
+        """Why the body gives way where that is its weight, else what may help."""
+        if self.weight is not None:
+            return self.weight.described
+        return "less gravity, load or stretch, or a stiffer material, may help"
+
+
+def support_of(system: System, material: Material, floor: float | None) -> SupportConditions:
+    """Return what a body comes to rest on, after a look whether it can.
+
+    What is attached, and what touches geoms, is not looked at: only motion tells whether they hold.
 
     Args:
         system: The body, and the loads in its stages.
+        material: What it is made of.
         floor: Height of the floor below it [m], or None.
 
     Raises:
-        TissueError: no node is fixed, and the forces do not balance or press on the floor.
+        TissueError: no node is fixed, and the forces do not balance or press on the floor; or the
+            material cannot carry its weight.
+    """
+    support = SupportConditions(floor, own_weight(system, material, floor))
+    if not (len(system.attachments.nodes) or system.geoms.geoms):
+        _expect_held(system, floor)
+        expect_bearable(support.weight)
+    return support
+
+
+def _expect_held(system: System, floor: float | None) -> None:
+    """Refuse a body that nothing can hold against its weight and its loads.
+
+    Raises:
+        TissueError: see `support_of`.
     """
     body, n = system.body, system.body.n_nodes
     if body.fixed[:n].any():
@@ -36,11 +73,64 @@ def expect_support(system: System, floor: float | None) -> None:
         return
     if floor is not None and total[2] < 0.0:
         return
+    found = f"({total[0]:.3g}, {total[1]:.3g}, {total[2]:.3g}) N of weight and loads"
+    if floor is not None:
+        raise TissueError(
+            f"the body cannot come to rest: nothing holds it against {found}, which do not press "
+            "it on the floor. Fix some of its nodes, or take gravity and loads away"
+        )
     raise TissueError(
-        f"the body cannot come to rest: nothing holds it against ({total[0]:.3g}, {total[1]:.3g}, "
-        f"{total[2]:.3g}) N of weight and loads. Fix some of its nodes, put a floor below it, or "
-        "take gravity and loads away"
+        f"the body cannot come to rest: nothing holds it against {found}. Fix some of its nodes, "
+        "put a floor below it, or take gravity and loads away"
     )
+
+
+def gone_too_far(
+    system: System, node: int, begin: FloatArray, support: SupportConditions
+) -> TissueError:
+    """Return the error that says why a node has gone far away, as far as can be seen.
+
+    Args:
+        system: The body.
+        node: Number of the node.
+        begin: Where it began [m], shape (3,).
+        support: What the body should have come to rest on.
+    """
+    way = float(np.linalg.norm(system.body.positions[node] - begin))
+    x, y, z = begin
+    found = (
+        f"the body cannot come to rest: node {node}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, has gone "
+        f"{way:.3g} m and goes on."
+    )
+    piece = _loose_piece(system, node)
+    if not len(piece):
+        return TissueError(
+            f"{found} The piece that it belongs to is held, and gives way: {support.remedy}"
+        )
+    if np.isin(system.attachments.nodes, piece).any():
+        return TissueError(
+            f"{found} No node of its piece is fixed; attachments hold it, and give way: stiffer or "
+            "more of them, fixed nodes, or less gravity and load may help"
+        )
+    if support.floor is None and not system.geoms.geoms:
+        return TissueError(
+            f"{found} Nothing holds the piece that it belongs to against its weight and its loads: "
+            "fix nodes of it, put a floor below it, or take gravity and loads away"
+        )
+    return TissueError(
+        f"{found} No node of its piece is fixed or attached, and what it touches does not keep it "
+        f"there: {support.remedy}"
+    )
+
+
+def _loose_piece(system: System, node: int) -> IntArray:
+    """Return the nodes of the piece that a node belongs to; none if one of them is fixed."""
+    loose = loose_pieces_of(system.body)
+    for begin, end in pairwise(loose.begin.tolist()):
+        nodes = loose.node[begin:end]
+        if (nodes == node).any():
+            return nodes
+    return loose.node[:0]
 
 
 class FastestNode(NamedTuple):
@@ -53,14 +143,19 @@ class FastestNode(NamedTuple):
     acceleration: float
     """The largest part of its acceleration [m/s2]."""
 
-    def described(self, n_steps: int) -> str:
-        """Return what it does after so many steps, and what helps."""
+    def described(self, n_steps: int, support: SupportConditions) -> str:
+        """Return what it does after so many steps, and what may help."""
         x, y, z = self.position
-        return (
+        found = (
             f"after {n_steps:,} steps node {self.node}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, is still "
-            f"accelerated by {self.acceleration:.2g} m/s2. What helps: a mesh without small or "
-            "flat tetrahedra, whose steps are short; a softer material; a lower Poisson's ratio; "
-            "less gravity, load or stretch where the body buckles"
+            f"accelerated by {self.acceleration:.2g} m/s2."
+        )
+        if support.weight is not None:
+            return f"{found} Its weight is much: {support.weight.described}"
+        return (
+            f"{found} What may help: a mesh without small or flat tetrahedra, whose steps are "
+            "short; a softer material; a lower Poisson's ratio; less gravity, load or stretch "
+            "where the body buckles"
         )
 
 
@@ -76,18 +171,25 @@ def fastest_node(system: System, accelerations: FloatArray) -> FastestNode:
     return FastestNode(node, system.body.positions[node], float(sizes[node]))
 
 
-def warn_of_motion(system: System, n_steps: int, accelerations: FloatArray, settled: float) -> None:
+def warn_of_motion(
+    system: System,
+    n_steps: int,
+    accelerations: FloatArray,
+    support: SupportConditions,
+    settled: float,
+) -> None:
     """Log a warning that a body has not come to rest yet.
 
     Args:
         system: The body.
         n_steps: Steps that it took.
         accelerations: Accelerations of its nodes [m/s2], shape (n_nodes, 3).
+        support: What it comes to rest on.
         settled: Acceleration at which it counts as settled [m/s2].
     """
     _log.warning(
         "the body has not come to rest, and moves on from here: %s; settling once more. Less than "
         "%.2g m/s2 counts as rest",
-        fastest_node(system, accelerations).described(n_steps),
+        fastest_node(system, accelerations).described(n_steps, support),
         settled,
     )

@@ -174,3 +174,52 @@ def test_a_body_that_does_not_come_to_rest_gets_a_warning_that_says_where(monkey
     caplog.clear()
     assert tissue.settle() < LONGEST_SETTLING
     assert caplog.text == ""
+
+
+def test_a_mesh_in_millimetres_is_refused_at_once_with_how_far_it_sags_and_the_scale(monkeypatch):
+    monkeypatch.setattr(equilibrium, "LONGEST_SETTLING", 0)  # no step is taken
+    mesh = block((4, 3, 3), (171.0, 120.0, 120.0))
+    tissue = Tissue(mesh, Material(), fixed=fixed_nodes(mesh, "left,right"))
+    with pytest.raises(TissueError, match=r"171 m in a material of 1e\+04 Pa.*--scale 0\.001"):
+        tissue.settle()
+
+
+@pytest.mark.parametrize(("side", "weight"), [("left,right", 50.0), ("none", 2.0)])
+def test_a_body_too_soft_for_its_weight_is_told_so_and_not_that_nothing_holds_it(side, weight):
+    """It is held at two sides, or lies on a floor."""
+    soft = Material(young_modulus=9810.0 * 0.04 / weight, toughness=1e-4)
+    floor = 0.0 if side == "none" else None
+    tissue = Tissue(CUBE, soft, fixed=fixed_nodes(CUBE, side), floor=floor)
+    with pytest.raises(TissueError, match=r"0\.04 m .* sags under its own weight") as error:
+        tissue.settle()
+    assert "Nothing holds" not in str(error.value)
+
+
+def test_supports_that_are_everywhere_carry_any_weight():
+    """What counts is the distance to a support, not the size of the body."""
+    fixed = np.ones(len(CUBE.positions), bool)
+    fixed[np.flatnonzero(~fixed_nodes(CUBE, "left,right,front,back,bottom,top"))[0]] = False
+    tissue = Tissue(CUBE, Material(young_modulus=3.0, toughness=1e-4), fixed=fixed)
+    assert tissue.settle() < LONGEST_SETTLING
+
+
+def test_a_body_that_hangs_on_springs_too_soft_is_told_so():
+    tissue = Tissue(CUBE, Material())
+    tissue.attach("top", stiffness=1e-6)
+    with pytest.raises(TissueError, match="attachments hold it, and give way"):
+        tissue.settle()
+
+
+def test_a_body_that_gives_way_under_a_load_is_not_told_that_it_is_too_heavy():
+    tissue = Tissue(CUBE, Material(), fixed=fixed_nodes(CUBE, "left"))
+    tissue.push("right", (1e4, 0.0, 0.0))
+    with pytest.raises(TissueError, match="less gravity, load or stretch") as error:
+        tissue.settle()
+    assert "weight" not in str(error.value)
+
+
+def test_a_body_that_is_pulled_off_its_floor_is_not_told_to_put_a_floor_below_it():
+    raised = Tissue(CUBE, Material(), floor=-1e-6, gravity=(0.0, 0.0, 9.81))
+    with pytest.raises(TissueError, match="do not press it on the floor") as error:
+        raised.settle()
+    assert "put a floor" not in str(error.value)
