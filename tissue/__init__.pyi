@@ -48,10 +48,10 @@ from .material_presets import Preset as Preset
 from .material_presets import SourcedValue as SourcedValue
 from .mesh.faces import boundary_faces as boundary_faces
 from .mesh.pieces import pieces_of as pieces_of
-from .mesh.validation import MeshError as MeshError
 from .shapes.block import block as block
 from .shapes.cylinder import cylinder as cylinder
 from .shapes.lattice_block import lattice_block as lattice_block
+from .mesh.mesh_arrays import MeshError as MeshError
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import Around as Around

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.mesh.faces import boundary_faces
+from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.types import TetrahedralMesh
 
 SIDES = {
@@ -72,9 +73,10 @@ def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
             m ("sphere:0.01,0.03,0.04,0.005"), or "none".
 
     Raises:
+        MeshError: The arrays of the mesh have another shape or hold no numbers.
         ValueError: The text is none of these, or the box or the sphere holds no node.
     """
-    text = specification.strip()
+    mesh, text = mesh_arrays(mesh), specification.strip()
     if text.lower() == "none":
         return np.zeros(len(mesh.positions), dtype=bool)
     if text.lower().startswith(_SPHERE):
@@ -95,6 +97,7 @@ def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:
     Raises:
         ValueError: A name is not a side.
     """
+    mesh = mesh_arrays(mesh)
     given = [name.strip().lower() for name in ([names] if isinstance(names, str) else names)]
     axes = [_side(name) for name in given if name != UNDERSIDE]
     triangles = boundary_faces(mesh.tetrahedra)
@@ -112,6 +115,7 @@ def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) ->
     Raises:
         ValueError: The corners are not finite or not in order, or no node is between them.
     """
+    mesh = mesh_arrays(mesh)
     low, high = _point(low, "the low corner"), _point(high, "the high corner")
     if not np.all(low <= high):
         raise ValueError(
@@ -135,6 +139,7 @@ def sphere_nodes(mesh: TetrahedralMesh, centre: npt.ArrayLike, radius: float) ->
     Raises:
         ValueError: A number is not finite, the radius is not positive, or no node is there.
     """
+    mesh = mesh_arrays(mesh)
     middle = _point(centre, "the centre of the sphere")
     if not (math.isfinite(radius) and radius > 0.0):
         raise ValueError(f"the radius of the sphere is {radius} m; it must be positive and finite")
@@ -156,6 +161,7 @@ def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLi
     Raises:
         ValueError: A value is not finite, the normal is zero, or no node is there.
     """
+    mesh = mesh_arrays(mesh)
     point, normal = _point(point, "the point"), _point(normal, "the normal")
     length = np.linalg.norm(normal)
     if length == 0.0:

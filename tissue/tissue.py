@@ -55,12 +55,7 @@ from tissue.mesh.validation import expect_sound
 from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
 from tissue.state.repeated_steps import RepeatedSteps
-from tissue.types import (
-    SchemeStatistics,
-    StageTimes,
-    StepResult,
-    TetrahedralMesh,
-)
+from tissue.types import SchemeStatistics, StageTimes, StepResult, TetrahedralMesh
 
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
 """The edge of no blade."""
@@ -100,7 +95,7 @@ class Tissue(RepeatedSteps):
         blade: BladeShape | None = None,
         solver: SolverSettings = SolverSettings(),
     ) -> None:
-        expect_sound(mesh)
+        mesh = expect_sound(mesh)
         self.material = material or Material()
         self.blade = blade
         self.floor = floor

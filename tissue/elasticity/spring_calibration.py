@@ -16,6 +16,7 @@ from tissue.core.array_types import BoolArray, FloatArray
 from tissue.elasticity.stiffness_matrix import gradients, stiffness_matrix
 from tissue.material import Material
 from tissue.mesh.faces import sorted_faces
+from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.types import TetrahedralMesh
 
 if TYPE_CHECKING:  # as in `tissue.elasticity.stiffness_matrix`
@@ -88,6 +89,7 @@ def spring_error(mesh: TetrahedralMesh, material: Material) -> SpringError:
         mesh: The body at rest.
         material: The material asked for.
     """
+    mesh = mesh_arrays(mesh)
     stiffness = stiffness_matrix(mesh, material)
     affine_motion = np.einsum("sij,nj->sni", STRAINS, mesh.positions).reshape(6, -1)
     volume = float(gradients(mesh).volume.sum())

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.mesh.validation import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 
 MAX_SHOWN = 40
 """Characters that an error quotes at most."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.mesh.validation import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 
 
 class CellType(NamedTuple):

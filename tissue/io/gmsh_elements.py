@@ -5,7 +5,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader
 from tissue.io.cell_types import CellType, expect_ignorable, expect_tetrahedra
-from tissue.mesh.validation import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 from tissue.types import TetrahedralMesh
 
 _TETRAHEDRON = 4

@@ -11,7 +11,8 @@ from tissue.io.gmsh import read_gmsh
 from tissue.io.vtk_legacy import read_vtk
 from tissue.io.vtu import read_vtu
 from tissue.io.vtu_writer import write_vtu
-from tissue.mesh.validation import MeshError, checked
+from tissue.mesh.mesh_arrays import MeshError
+from tissue.mesh.validation import checked
 from tissue.types import TetrahedralMesh
 
 __all__ = ["READERS", "MeshError", "read_mesh", "write_vtu"]
@@ -30,9 +31,9 @@ RENUMBER_FROM = 100_000
 """Tetrahedra from which another order pays. Smaller bodies stay in the cache in any order; at
 600,000 a step of a body in random order, as mesh generators write it, takes 1.7 times as long."""
 
-MAX_FILE_BYTES = 2**31
-"""Size of the largest file [bytes]: a larger one holds tens of millions of tetrahedra, too many to
-cut at an interactive rate."""
+MAX_FILE_BYTES = 2**31 - 1
+"""Size of the largest file [bytes]: the parser of XML counts in 32 bits. A larger one holds tens of
+millions of tetrahedra, too many to cut at an interactive rate."""
 
 
 def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMesh:

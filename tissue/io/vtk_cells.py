@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.io.cell_types import CellType, expect_ignorable, expect_tetrahedra
-from tissue.mesh.validation import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 
 _TETRAHEDRON = 10
 

@@ -10,7 +10,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import as_floats, as_ints, shown
 from tissue.io.vtk_cells import tetrahedra_of
 from tissue.io.vtu_data import Encoding, decoded
-from tissue.mesh.validation import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 from tissue.types import TetrahedralMesh
 
 MAX_RATIO = 100

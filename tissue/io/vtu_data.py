@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.io.byte_reader import ByteReader, shown
-from tissue.mesh.validation import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 
 _DTYPES = {
     "Int8": "i1",

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.io.whole_file import whole_file
+from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.mesh.pieces import piece_of_tetrahedra
-from tissue.types import Snapshot
+from tissue.types import Snapshot, TetrahedralMesh
 
 VTK_TETRA = 10
 """VTK's number for a tetrahedron with four nodes."""
@@ -28,8 +29,11 @@ def write_vtu(path: str | os.PathLike[str], snapshot: Snapshot) -> None:
     appears under its name only when it is complete, so an interrupted write leaves the old one.
 
     Raises:
+        MeshError: Positions or tetrahedra have another shape or hold no numbers.
         OSError: The file cannot be written.
     """
+    mesh = mesh_arrays(TetrahedralMesh(snapshot.positions, snapshot.tetrahedra))
+    snapshot = snapshot._replace(positions=mesh.positions, tetrahedra=mesh.tetrahedra)
     with whole_file(path) as unfinished, unfinished.open("wb") as file:
         for line in _lines(snapshot):
             file.write(line.encode("ascii") + b"\n")

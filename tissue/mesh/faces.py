@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.mesh.mesh_arrays import tetrahedron_array
 
 OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Local nodes of the face opposite each node, counter-clockwise seen from outside; shape (4, 3)."""
@@ -38,7 +39,14 @@ def boundary_faces(tetrahedra: IntArray) -> IntArray:
     """Return the triangles that belong to one tetrahedron only, shape (n_triangles, 3).
 
     Counter-clockwise seen from outside, where the signed volumes are positive.
+
+    Args:
+        tetrahedra: Node indices of any type of whole numbers, shape (n_tets, 4).
+
+    Raises:
+        MeshError: there are no tetrahedra, or they have another shape or are no whole numbers.
     """
+    tetrahedra = tetrahedron_array(tetrahedra)
     faces = sorted_faces(tetrahedra)
     tets, local = np.divmod(np.sort(faces.halves[faces.starts[faces.counts == 1]]), 4)
     return np.take_along_axis(tetrahedra[tets], OUTWARD[local], axis=1)

@@ -6,6 +6,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.geometry.connected_components import components
 from tissue.mesh.body import Body, behind, n_behind
+from tissue.mesh.mesh_arrays import tetrahedron_array
 from tissue.types import Piece, Snapshot
 
 
@@ -47,10 +48,10 @@ def piece_of_tetrahedra(body: Snapshot) -> IntArray:
     The nodes suffice: the tetrahedra around a node are connected through faces, or the node would
     have been doubled, so pieces share no node.
     """
-    tetrahedra = body.tetrahedra
+    tetrahedra = tetrahedron_array(body.tetrahedra)
     edges = np.stack([np.repeat(tetrahedra[:, 0], 3), tetrahedra[:, 1:].ravel()], axis=1)
     _, group = components(len(body.positions), edges)
-    volumes = _volumes(body.rest_positions, tetrahedra)
+    volumes = _volumes(np.asarray(body.rest_positions, dtype=np.float64), tetrahedra)
     found, first, piece = np.unique(group[tetrahedra[:, 0]], return_index=True, return_inverse=True)
     piece = piece.ravel()
     by_size = np.lexsort((first, -np.bincount(piece, volumes, len(found))))
@@ -64,6 +65,7 @@ def pieces_of(body: Snapshot) -> tuple[Piece, ...]:
 
     Centre, momenta and inertia are those of point masses at the nodes, as in the engine.
     """
+    body = body._replace(tetrahedra=tetrahedron_array(body.tetrahedra))
     of_tetrahedron = piece_of_tetrahedra(body)
     of_node = np.zeros(len(body.positions), dtype=np.int64)
     of_node[body.tetrahedra] = of_tetrahedron[:, None]

@@ -10,6 +10,8 @@ from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.geometry.connected_components import components
 from tissue.mesh.crowded_nodes import crowding_of
 from tissue.mesh.faces import OUTWARD, SortedFaces, sorted_faces
+from tissue.mesh.mesh_arrays import MeshError as MeshError
+from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.types import TetrahedralMesh
 
 _logger = logging.getLogger("tissue")
@@ -36,10 +38,6 @@ sources were joined. Of more, it is unclear which are right."""
 
 N_NAMED = 5
 """Elements that an error names at most."""
-
-
-class MeshError(ValueError):
-    """A mesh, or the file that should hold one, cannot be used. The message says why."""
 
 
 class CheckedMesh(NamedTuple):
@@ -84,8 +82,8 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     return result
 
 
-def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
-    """Refuse a mesh that is broken, or that `checked` would have to repair.
+def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> TetrahedralMesh:
+    """Return a mesh as `mesh_arrays` does; refuse one that is broken, or would be repaired.
 
     For callers that also have data for each node of the mesh, and therefore must not change it.
 
@@ -96,6 +94,7 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
         result = _checked(mesh)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
+    mesh = mesh_arrays(mesh)
     n_nodes = len(result.mesh.positions)
     is_same = n_nodes == len(mesh.positions) and np.array_equal(
         result.mesh.tetrahedra, mesh.tetrahedra
@@ -105,12 +104,13 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
             f"{name}: it would have to be repaired ({'; '.join(result.warnings)}): pass it through "
             "tissue.mesh.validation.checked first"
         )
+    return mesh
 
 
 def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
     """Return what `checked` returns: one check after another, each relying on those before."""
     warnings: list[str] = []
-    positions, tetrahedra = _as_arrays(mesh)
+    positions, tetrahedra = mesh_arrays(mesh)
     _refuse_wrong_indices(tetrahedra, len(positions))
     _refuse_not_finite(positions)
     positions, tetrahedra, origin = _without_unused(positions, tetrahedra, warnings)
@@ -127,24 +127,6 @@ def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
     _count_pieces(len(tetrahedra), pairs // 4, warnings)
     sound = TetrahedralMesh(np.concatenate([positions, positions[copied]]), tetrahedra)
     return CheckedMesh(sound, np.concatenate([origin, origin[copied]]), tuple(warnings))
-
-
-def _as_arrays(mesh: TetrahedralMesh) -> tuple[FloatArray, IntArray]:
-    """Return positions and tetrahedra as arrays of our types and shapes."""
-    positions, tetrahedra = np.asarray(mesh.positions), np.asarray(mesh.tetrahedra)
-    if tetrahedra.size == 0:
-        raise MeshError("there are no tetrahedra")
-    if positions.ndim != 2 or positions.shape[1] != 3 or positions.dtype.kind not in "fiu":
-        raise MeshError(
-            f"positions are {positions.dtype} of shape {positions.shape}; "
-            "they must be numbers of shape (n_nodes, 3)"
-        )
-    if tetrahedra.ndim != 2 or tetrahedra.shape[1] != 4 or tetrahedra.dtype.kind not in "iu":
-        raise MeshError(
-            f"tetrahedra are {tetrahedra.dtype} of shape {tetrahedra.shape}; "
-            "they must be whole numbers of shape (n_tets, 4)"
-        )
-    return positions.astype(np.float64), tetrahedra.astype(np.int64)
 
 
 def _refuse_wrong_indices(tetrahedra: IntArray, n_nodes: int) -> None:
