@@ -286,6 +286,22 @@ def test_threads_give_the_same_bits():
     assert states[0] == states[1]
 
 
+def test_a_move_that_is_refused_moves_none_of_the_geoms():
+    """The second has no pose: the first, which has, stays as well."""
+    balls = [Geom(name, "sphere", (0.01,)) for name in ("one", "two")]
+    begin = np.array([[0.02, 0.015, 0.05], [0.1, 0.1, 0.1]])
+    states = []
+    for is_tried in (False, True):
+        tissue = brick()
+        touch = tissue.collide_with(balls, begin)
+        if is_tried:
+            with pytest.raises(ValueError, match="geom 'two'"):
+                touch.move(begin + np.array([[0, 0, -0.015], [0, 0, np.nan]]))
+        tissue.step(None, DT)
+        states.append(tissue.snapshot().positions.tobytes() + touch.arrays.geoms.origin.tobytes())
+    assert states[0] == states[1]
+
+
 def test_a_body_that_no_geom_holds_is_refused_or_said_to_move():
     tissue = brick()
     tissue.collide_with(

@@ -13,6 +13,9 @@ from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
 from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
+from .core.limits import LARGEST_COORDINATE as LARGEST_COORDINATE
+from .core.limits import LARGEST_STRENGTH as LARGEST_STRENGTH
+from .core.limits import MOST_SUBSTEPS as MOST_SUBSTEPS
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
 from .core.memento_reading import StateError as StateError
@@ -26,6 +29,8 @@ from .elasticity.spring_calibration import SpringError as SpringError
 from .elasticity.spring_calibration import calibrated as calibrated
 from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.connected_components import components as components
+from .geometry.rotations import are_rotations as are_rotations
+from .geometry.rotations import checked_rotation as checked_rotation
 from .input_checks import expect_toughness_in_range as expect_toughness_in_range
 from .integrators.options import Global as Global
 from .integrators.options import Hierarchical as Hierarchical
@@ -47,11 +52,11 @@ from .material_presets import MATERIALS as MATERIALS
 from .material_presets import Preset as Preset
 from .material_presets import SourcedValue as SourcedValue
 from .mesh.faces import boundary_faces as boundary_faces
+from .mesh.mesh_arrays import MeshError as MeshError
 from .mesh.pieces import pieces_of as pieces_of
 from .shapes.block import block as block
 from .shapes.cylinder import cylinder as cylinder
 from .shapes.lattice_block import lattice_block as lattice_block
-from .mesh.mesh_arrays import MeshError as MeshError
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import Around as Around
@@ -93,12 +98,15 @@ __all__ = [
     "Global",
     "Hierarchical",
     "IntArray",
+    "LARGEST_COORDINATE",
+    "LARGEST_STRENGTH",
     "Law",
     "Attachment",
     "FramePath",
     "Ligament",
     "Load",
     "MATERIALS",
+    "MOST_SUBSTEPS",
     "Material",
     "MaterialPoints",
     "Memento",
@@ -126,10 +134,12 @@ __all__ = [
     "TissueState",
     "ToughnessLaw",
     "Wrench",
+    "are_rotations",
     "block",
     "boundary_faces",
     "cache_directory",
     "calibrated",
+    "checked_rotation",
     "components",
     "cylinder",
     "expect_toughness_in_range",

@@ -42,6 +42,7 @@ from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.step_context import Increment
+from tissue.integrators.step_length import expect_few_steps
 from tissue.integrators.system import Numerics, assembled
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.load import Loads
@@ -147,6 +148,7 @@ class Tissue(RepeatedSteps):
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
         dt = checked_time_step(dt)
+        expect_few_steps(self._system, self._global_stepper.method.limit, dt)
         interaction, incision = self._system.interaction, self._incision
         travel = edge.travel if has_blade else 0.0
         n = incision.n_increments(travel)

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridge.input_checks import ROTATION_TOLERANCE, are_rotations
+from bridge.input_checks import FRAME_TOLERANCE
 from bridge.led_geoms import GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
-from tissue import Geom, GeomForces, StepResult
+from tissue import Geom, GeomForces, StepResult, are_rotations
 
 
 class LedContact:
@@ -62,7 +62,7 @@ def _checked(poses: GeomPoses, geoms: Sequence[Geom]) -> GeomPoses:
     if not np.isfinite(origins).all():
         g = int(np.argmin(np.isfinite(origins).all(axis=1)))
         raise ValueError(f"the origin of geom '{geoms[g].name}' is {origins[g].tolist()} m")
-    wrong = ~are_rotations(axes, ROTATION_TOLERANCE)
+    wrong = ~are_rotations(axes, FRAME_TOLERANCE)
     if wrong.any():
         g = int(np.argmax(wrong))
         raise ValueError(

@@ -9,9 +9,8 @@ import numpy as np
 
 from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
 from bridge.scene_names import WANTED_NAME, is_scene_name
-from bridge.tcp.messages.poses import LARGEST_COORDINATE
 from bridge.tcp.wire import MessageError
-from tissue import Wrench
+from tissue import LARGEST_COORDINATE, Wrench
 
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-5, 1.0
 """Shortest and longest period [s]. A device sends up to a thousand poses a second."""

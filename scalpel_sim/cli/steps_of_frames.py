@@ -4,12 +4,10 @@ import logging
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.simulation import Simulation
+from tissue import MOST_SUBSTEPS
 
 MANY_SUBSTEPS = 200
 """Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
-
-MOST_SUBSTEPS = 20_000
-"""Runge-Kutta steps in a frame at most. With the organ it takes 5 s, and a signal waits as long."""
 
 _log = logging.getLogger(__name__)
 

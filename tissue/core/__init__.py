@@ -3,6 +3,7 @@
 In the order in which they are best read:
 
     array_types    types of arrays, by what they hold
+    limits         how much may be asked of a tissue
     jit            the decorator that compiles kernels
     lazy_fields    tuples whose fields are made when they are asked for
     vec3           points and vectors of three numbers

@@ -8,13 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.limits import LARGEST_COORDINATE, LARGEST_STRENGTH
 from tissue.core.three_vectors import Wrench
+from tissue.geometry.rotations import checked_rotation
 from tissue.integrators.attachments import SEVERED
 from tissue.loads.frame_path import FramePath
 from tissue.loads.material_points import MaterialPoints
-
-_ORTHONORMAL = 1e-6
-"""How far a rotation may be from one, by rounding."""
 
 
 class Attachment:
@@ -32,7 +31,7 @@ class Attachment:
         origin: Origin of the frame [m], shape (3,).
 
     Raises:
-        ValueError: a number is not finite, or has the wrong sign.
+        ValueError: a number is not finite, has the wrong sign, or is beyond `tissue.core.limits`.
     """
 
     def __init__(
@@ -46,16 +45,18 @@ class Attachment:
         breaks_at: float = math.inf,
         origin: Sequence[float] | FloatArray | None = None,
     ) -> None:
-        if not (math.isfinite(stiffness) and stiffness > 0.0):
-            raise ValueError(f"stiffness is {stiffness} N/m; it must be positive and finite")
+        expect_strength("stiffness", stiffness, "N/m")
         if not breaks_at > 0.0:
             raise ValueError(f"breaks_at is {breaks_at} N; it must be positive")
         self.points = points
         self.number = -1
         """Its number among all attachments of its tissue; -1 where it never held."""
-        self.stiffness, self.damping = float(stiffness), checked_amount("damping", damping)
+        self.stiffness = float(stiffness)
+        self.damping = checked_amount("damping", damping, LARGEST_STRENGTH)
         self.breaks_at = float(breaks_at)
-        self.lengths: FloatArray = np.full(len(points), checked_amount("rest_length", rest_length))
+        self.lengths: FloatArray = np.full(
+            len(points), checked_amount("rest_length", rest_length, LARGEST_COORDINATE)
+        )
         """Length up to which each point is slack [m], shape (n,)."""
         self.sections: FloatArray = np.zeros(len(points))
         """Cross-section of each, where it is a strand that the blade can cut [m2], shape (n,)."""
@@ -99,9 +100,7 @@ class Attachment:
         Raises:
             ValueError: a number is not finite, or it is no rotation.
         """
-        axes = self._end[0] if rotation is None else np.array(rotation, dtype=np.float64)
-        if axes.shape != (3, 3) or not np.abs(axes.T @ axes - np.eye(3)).max() <= _ORTHONORMAL:
-            raise ValueError(f"rotation is {rotation!r}; it must be three axes as columns")
+        axes = self._end[0] if rotation is None else checked_rotation(rotation, "rotation")
         self._end = (axes, _triple("origin", np.array(origin, dtype=np.float64)))
 
     def follow(self, path: FramePath) -> None:
@@ -156,17 +155,33 @@ class Attachment:
 
 def _triple(name: str, values: FloatArray) -> FloatArray:
     """Return three finite numbers."""
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise ValueError(f"{name} is {values.tolist()}; it is three finite numbers in m")
+    if values.shape != (3,) or not (np.abs(values) <= LARGEST_COORDINATE).all():  # false for NaN
+        raise ValueError(
+            f"{name} is {values.tolist()}; it is three finite numbers in m, of at most "
+            f"{LARGEST_COORDINATE:g}"
+        )
     return values
 
 
-def checked_amount(name: str, value: float) -> float:
-    """Return a number that is finite and not negative.
+def expect_strength(name: str, value: float, unit: str) -> None:
+    """Refuse a stiffness or a toughness that is not positive, or beyond that of any material.
+
+    Raises:
+        ValueError: it is.
+    """
+    if not 0.0 < value <= LARGEST_STRENGTH:
+        raise ValueError(
+            f"{name} is {value} {unit}; it must be positive and at most {LARGEST_STRENGTH:g}, far "
+            "beyond that of steel"
+        )
+
+
+def checked_amount(name: str, value: float, most: float) -> float:
+    """Return a number that is not negative, and at most `most`.
 
     Raises:
         ValueError: it is not.
     """
-    if not (math.isfinite(value) and value >= 0.0):
-        raise ValueError(f"{name} is {value}; it must be finite and not negative")
+    if not 0.0 <= value <= most:
+        raise ValueError(f"{name} is {value}; it must not be negative, and at most {most:g}")
     return float(value)

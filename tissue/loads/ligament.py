@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray
-from tissue.loads.attachment import Attachment, checked_amount
+from tissue.core.limits import LARGEST_COORDINATE
+from tissue.loads.attachment import Attachment, checked_amount, expect_strength
 from tissue.loads.material_points import MaterialPoints
 
 
@@ -27,7 +28,7 @@ class Ligament(Attachment):
         breaks_at: Force of all of them at which they let go [N].
 
     Raises:
-        ValueError: a number is not finite, or has the wrong sign.
+        ValueError: a number is not finite, has the wrong sign, or is beyond `tissue.core.limits`.
     """
 
     def __init__(
@@ -42,9 +43,11 @@ class Ligament(Attachment):
         damping: float = 0.0,
         breaks_at: float = math.inf,
     ) -> None:
-        for name, value, unit in (("area", area, "m2"), ("toughness", toughness, "J/m2")):
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} is {value} {unit}; it must be positive and finite")
+        if not 0.0 < area <= LARGEST_COORDINATE:
+            raise ValueError(
+                f"area is {area} m2; it must be positive and at most {LARGEST_COORDINATE:g}"
+            )
+        expect_strength("toughness", toughness, "J/m2")
         super().__init__(points, others, stiffness=stiffness, damping=damping, breaks_at=breaks_at)
         self.lengths = lengths
         self.sections = area * points.shares
@@ -65,12 +68,15 @@ def ends_of_strands(
         ValueError: `to` has another shape or is not finite, or the length is negative.
     """
     others = np.array(to, dtype=np.float64)
-    if others.shape not in ((3,), positions.shape) or not np.isfinite(others).all():
+    is_near = (np.abs(others) <= LARGEST_COORDINATE).all()  # false for NaN
+    if others.shape not in ((3,), positions.shape) or not is_near:
         raise ValueError(
             f"to is {to!r}; it is one place in m, or one for each of the {len(positions)} points, "
-            "all finite"
+            f"all finite and at most {LARGEST_COORDINATE:g}"
         )
     others = others + np.zeros_like(positions)
     if rest_length is None:
         return others, np.linalg.norm(others - positions, axis=1)
-    return others, np.full(len(positions), checked_amount("rest_length", rest_length))
+    return others, np.full(
+        len(positions), checked_amount("rest_length", rest_length, LARGEST_COORDINATE)
+    )

@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 
 from bridge.led_geoms import NO_GEOM_LOADS, GeomLoads, GeomPoses
-from bridge.tcp.messages.poses import LARGEST_COORDINATE, checked_poses
+from bridge.tcp.messages.poses import checked_poses
 from bridge.tcp.wire import MessageError
-from tissue import FloatArray, Geom
+from tissue import LARGEST_COORDINATE, FloatArray, Geom
 
 MAX_GEOMS = 1 << 12
 """Largest number of geoms: a hundred times that of two arms."""

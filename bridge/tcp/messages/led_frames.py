@@ -8,9 +8,8 @@ from typing import Annotated, TypeVar
 import msgspec
 
 from bridge.led_frames import FrameHold, FrameLoad, FrameTie
-from bridge.tcp.messages.poses import LARGEST_COORDINATE
 from bridge.tcp.wire import LARGEST_REPLY, MessageError
-from tissue import Wrench
+from tissue import LARGEST_COORDINATE, LARGEST_STRENGTH, Wrench
 
 MAX_FRAMES = 1 << 12
 """Largest number of frames: a thousand times that of two hands and what holds an organ."""
@@ -27,10 +26,7 @@ _Where = str | list[int] | list[list[float]]
 _Node = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_REPLY)]
 _Coordinate = Annotated[float, msgspec.Meta(ge=-LARGEST_COORDINATE, le=LARGEST_COORDINATE)]
 _Place = tuple[_Coordinate, _Coordinate, _Coordinate]
-_LARGEST_STRENGTH = 1e9
-"""Largest stiffness [N/m], damping [N s/m] and toughness [J/m2], far beyond those of steel: with
-1e308 forces are infinite."""
-_Strength = Annotated[float, msgspec.Meta(ge=-_LARGEST_STRENGTH, le=_LARGEST_STRENGTH)]
+_Strength = Annotated[float, msgspec.Meta(ge=-LARGEST_STRENGTH, le=LARGEST_STRENGTH)]
 _Places = Annotated[list[_Place], msgspec.Meta(min_length=1)]
 
 

@@ -2,19 +2,11 @@
 
 import numpy as np
 
-from bridge.input_checks import are_rotations
 from bridge.tcp.wire import MessageError
-from tissue import FloatArray
-
-LARGEST_COORDINATE = 1e3
-"""Largest coordinate [m]. No body is larger; a blade farther away means an invalid message."""
+from tissue import LARGEST_COORDINATE, FloatArray, are_rotations
 
 POSE_BYTES = 12 * 8
 """Length of a pose [byte]: its origin, and the rows of its rotation."""
-
-_ROTATION_TOLERANCE = 1e-6
-"""Largest difference of R^T R from the identity for a rotation R: the accuracy of single
-precision."""
 
 
 def pack_poses(origins: FloatArray, rotations: FloatArray) -> bytes:
@@ -46,7 +38,7 @@ def checked_poses(rows: FloatArray, n_frames: int) -> tuple[FloatArray, FloatArr
         raise MessageError(
             f"{_owner(i, n_frames)} is not within {LARGEST_COORDINATE:g} m: {origins[i].tolist()}"
         )
-    are_axes = are_rotations(rotations, _ROTATION_TOLERANCE)
+    are_axes = are_rotations(rotations)
     if not are_axes.all():
         i = int(np.argmin(are_axes))
         raise MessageError(

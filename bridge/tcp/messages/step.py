@@ -8,9 +8,9 @@ import numpy as np
 
 from bridge.led_frames import FramePose
 from bridge.led_geoms import NO_GEOMS, GeomPoses
-from bridge.tcp.messages.poses import LARGEST_COORDINATE, POSE_BYTES, checked_poses, pack_poses
+from bridge.tcp.messages.poses import POSE_BYTES, checked_poses, pack_poses
 from bridge.tcp.wire import MessageError
-from tissue import BladeSegment, BladeSweep
+from tissue import LARGEST_COORDINATE, BladeSegment, BladeSweep
 
 _SHORTEST_STEP, _LONGEST_STEP = 1e-9, 1.0
 """Shortest and longest step [s]. A frame is a millisecond. A step of hours would take days, and in

@@ -252,8 +252,12 @@ def test_each_side_of_a_cut_through_a_grip_keeps_its_points():
     ("where", "numbers", "expected"),
     [
         (TOP, {"stiffness": 0.0}, "stiffness is 0.0 N/m; it must be positive"),
-        (TOP, {"stiffness": np.inf}, "must be positive and finite"),
+        (TOP, {"stiffness": np.inf}, "must be positive and at most"),
+        (TOP, {"stiffness": 1.01e9}, r"stiffness is .*at most 1e\+09"),
         (TOP, {"damping": -1.0}, "damping is -1.0"),
+        (TOP, {"damping": 1e30}, r"damping is 1e\+30"),
+        (TOP, {"rest_length": 1e4}, r"rest_length is .*at most 1000"),
+        (TOP, {"origin": [0.0, 2e3, 0.0]}, "of at most 1000"),
         (TOP, {"rest_length": np.nan}, "rest_length is nan"),
         (TOP, {"breaks_at": 0.0}, "breaks_at is 0.0 N"),
         (TOP, {"origin": [0.0, np.nan, 0.0]}, "three finite numbers"),
@@ -266,10 +270,26 @@ def test_what_makes_no_sense_is_refused(where, numbers, expected):
         cube().attach(where, **({"stiffness": 100.0} | numbers))
 
 
-def test_a_frame_that_is_no_frame_is_refused():
+@pytest.mark.parametrize(
+    ("axes", "expected"),
+    [
+        (2.0 * np.eye(3), "not orthonormal"),
+        (-np.eye(3), "a reflection"),
+        (np.full((3, 3), np.nan), "not finite"),
+        (np.full((3, 3), 1e200), "not orthonormal"),
+        (np.eye(2), "three axes as columns"),
+    ],
+)
+def test_axes_that_are_no_rotation_are_refused_and_the_frame_stays(axes, expected):
     grip = cube().attach(TOP, stiffness=100.0)
-    with pytest.raises(ValueError, match="must be three axes"):
-        grip.move(NOTHING, 2.0 * np.eye(3))
+    before = grip.way
+    with pytest.raises(ValueError, match=expected):
+        grip.move(NOTHING, axes)
+    assert grip.way is not before and all(a is b for a, b in zip(grip.way, before, strict=True))
+
+
+def test_an_origin_that_is_none_is_refused():
+    grip = cube().attach(TOP, stiffness=100.0)
     with pytest.raises(ValueError, match="three finite numbers"):
         grip.move([0.0, 0.0])
 

@@ -162,6 +162,8 @@ class GeomContact:
         rows = axes.reshape(n, 9)
         fault, g = self._lead.call(self.arrays.geoms, places, rows, largest_turn, farthest)
         if fault != TAKEN:
+            before = self._origins, self._rotations.reshape(n, 9)  # those before it were led
+            self._lead.call(self.arrays.geoms, *before, math.inf, math.inf)
             what = f"geom '{self.geoms[g].name}'"
             raise ValueError(
                 {

@@ -11,6 +11,7 @@ from tissue.contact.geoms.geom_arrays import Geoms
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
+from tissue.geometry.rotations import ROTATION_TOLERANCE
 
 
 @kernel
@@ -35,10 +36,6 @@ NO_ROTATION: Final = 2
 TURNS_TOO_FAR: Final = 3
 MOVES_TOO_FAR: Final = 4
 """What `lead_geoms` found."""
-
-_ORTHONORMAL: Final = 1e-6
-"""How far the axes of a geom may be from orthonormal, by rounding. Larger: bodies that are not
-rigid are taken for rigid; smaller: poses in single precision are refused."""
 
 
 @kernel
@@ -65,7 +62,7 @@ def lead_geoms(
         for i in range(3):
             for j in range(3):
                 product = dot(columns[i], columns[j]) - (1.0 if i == j else 0.0)
-                if not abs(product) <= _ORTHONORMAL:
+                if not abs(product) <= ROTATION_TOLERANCE:
                     return NO_ROTATION, g
         if dot(cross(columns[0], columns[1]), columns[2]) < 0.0:
             return NO_ROTATION, g

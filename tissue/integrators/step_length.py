@@ -1,0 +1,49 @@
+"""How long a time step may be: what takes too many steps of the integrator has no end."""
+
+import math
+
+from tissue.core.limits import MOST_SUBSTEPS
+from tissue.integrators.stability import SAFETY, VERLET_LIMIT, stable_step
+from tissue.integrators.system import System
+
+_SURELY_FEW = 0.1
+"""Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
+longest step need not be computed. It takes some 1.3 steps at most for each of them, by
+`stability.STABILITY_LIMIT`."""
+
+DAMPED = 0.5 * VERLET_LIMIT
+"""Frequency times the longest step, over the safety, below which it is damping that makes steps
+short: half of the least that any of the methods takes without damping."""
+
+
+def expect_few_steps(system: System, method: int, dt: float) -> None:
+    """Refuse a time step that takes more than `MOST_SUBSTEPS` steps of the integrator.
+
+    Args:
+        system: The body before the step, which is not changed.
+        method: What limits its steps: a constant of `tissue.integrators.stability`.
+        dt: Length of the step [s].
+
+    Raises:
+        ValueError: it does; the message says why, and how long a step may be.
+    """
+    elastic, surroundings = system.elasticity.arrays, system.surroundings
+    of_body = system.elasticity.frequency_squared
+    of_holds = system.added_by_attachments
+    squared = of_body + of_holds + system.contact.added_frequency_squared
+    rate = surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag
+    if dt * (math.sqrt(squared) + rate) <= _SURELY_FEW * MOST_SUBSTEPS:
+        return
+    step = stable_step(method, elastic, squared, surroundings)
+    if dt <= MOST_SUBSTEPS * step:
+        return
+    reason = "its elements are small, stiff or light"
+    if math.sqrt(squared) * step < DAMPED * SAFETY:
+        reason = "damping in it, or of what is attached to it, is strong"
+    elif of_holds > of_body:
+        reason = "what is attached to it is held stiffly"
+    raise ValueError(
+        f"a time step of {dt:.3g} s takes some {dt / step:.3g} steps of the integrator in this "
+        f"tissue, because {reason}; at most {MOST_SUBSTEPS:,} are done. Take time steps of at most "
+        f"{MOST_SUBSTEPS * step:.2g} s"
+    )
