@@ -37,7 +37,7 @@ class BladeShape:
                 raise ValueError(f"the blade's {field.name} is {value}; it must be positive")
         if self.bevel_angle > STEEPEST_BEVEL:
             raise ValueError(
-                f"the blade's bevel_angle is {self.bevel_angle} rad, {self.bevel_degrees:.0f} "
+                f"the blade's bevel_angle is {self.bevel_angle} rad, {self.bevel_degrees:.4g} "
                 f"degrees; at most {math.degrees(STEEPEST_BEVEL):.0f}"
             )
         if self.bevel_length >= self.height:

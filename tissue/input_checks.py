@@ -331,8 +331,8 @@ def _toughness_in_nodes(material: Material, node_size: float) -> str:
     """Return toughness over Young's modulus, in words."""
     length = material.toughness / material.young_modulus
     return (
-        f"toughness / young_modulus is {length * 1e3:.1f} mm, {length / node_size:.1f} times the "
-        f"mean node size of {node_size * 1e3:.1f} mm"
+        f"toughness / young_modulus is {length * 1e3:.3g} mm, {length / node_size:.3g} times the "
+        f"mean node size of {node_size * 1e3:.3g} mm"
     )
 
 
@@ -341,7 +341,7 @@ def warn_of_ratio(material: Material) -> None:
     ratio = material.poisson_ratio
     if ratio > NEARLY_INCOMPRESSIBLE:
         _log.warning(
-            "poisson_ratio is %g: time steps are %.1f times shorter than at 0.45, because waves of "
+            "poisson_ratio is %g: time steps are %.3g times shorter than at 0.45, because waves of "
             "compression are that much faster. 0.45 to 0.49 is as incompressible as a soft body "
             "looks",
             ratio,

@@ -54,7 +54,7 @@ class RequestLimits:
         most_steps = max(MOST_STEPS_ASKED, MOST_WORK / n_tetrahedra)
         if dt > most_steps * self._step:
             raise MessageError(
-                f"a step of {dt:g} s, which takes some {dt / self._step:,.0f} steps of the "
+                f"a step of {dt:g} s, which takes some {dt / self._step:.4g} steps of the "
                 f"integrator; at most {most_steps * self._step:.3g} s are allowed. Take shorter "
                 "steps"
             )

@@ -22,7 +22,7 @@ def check_steps_of_frames(simulation: Simulation) -> None:
     if n_steps <= MANY_SUBSTEPS:
         return
     found = (
-        f"a frame takes {n_steps:,.0f} Runge-Kutta steps, because the tissue's elements are small, "
+        f"a frame takes {n_steps:.4g} Runge-Kutta steps, because the tissue's elements are small, "
         "stiff or light"
     )
     remedy = "Check --scale, or lower --young, or raise --density"

@@ -180,7 +180,7 @@ def _check(times: FloatArray, tips: FloatArray, heels: FloatArray, forwards: Flo
         i = int(np.argmax(off))
         raise _PoseError(
             i,
-            f"the blade is {1e3 * lengths[i]:.2f} mm long, and was {1e3 * lengths[0]:.2f} mm at "
+            f"the blade is {1e3 * lengths[i]:.4g} mm long, and was {1e3 * lengths[0]:.4g} mm at "
             "the start; a blade does not stretch",
         )
     across = np.cross(edges, forwards)

@@ -11,7 +11,17 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
-from tissue import BladeSegment, BladeSweep, Material, MeshError, TetrahedralMesh, Tissue, block
+from tissue import (
+    BladeSegment,
+    BladeShape,
+    BladeSweep,
+    Material,
+    MeshError,
+    TetrahedralMesh,
+    Tissue,
+    block,
+)
+from tissue.shapes.isosurface_stuffing import stuff
 
 MESH = block((2, 2, 2), (0.04, 0.04, 0.04))
 POSE = strokes.pose((0.02, 0.01, -0.01), (0.02, 0.01, 0.05), (0.0, 1.0, 0.0))
@@ -283,3 +293,22 @@ def test_a_blade_that_moves_too_far_in_a_step_is_refused_before_it_does_anything
     with pytest.raises(ValueError, match=r"moves 1e\+03 m in one step; that may be \d+"):
         tissue.step(BladeSweep(near, far), 1e-3)
     assert all(map(np.array_equal, before, tissue.snapshot()))
+
+
+def test_a_warning_of_a_huge_toughness_has_no_hundreds_of_digits(caplog):
+    Tissue(MESH, Material(toughness=1e300))
+    assert "1e+299 mm" in caplog.text
+    assert len(caplog.text) < 600
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: BladeShape(bevel_angle=1e300),
+        lambda: stuff(lambda points: points[:, 0], [[0.0] * 3, [1.0] * 3], 1e-90),
+    ],
+)
+def test_a_refusal_of_a_huge_number_has_no_hundreds_of_digits(make):
+    with pytest.raises(ValueError, match=r"e\+\d\d") as refused:
+        make()
+    assert len(str(refused.value)) < 200

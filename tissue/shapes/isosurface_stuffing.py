@@ -96,7 +96,7 @@ def _checked_box(bounds: npt.ArrayLike, spacing: float) -> tuple[FloatArray, Int
     cells = np.ceil((box[1] - box[0]) / spacing) + 2  # one more around it for the outermost points
     if 2 * np.prod(cells) > MAX_LATTICE_POINTS:
         raise ValueError(
-            f"spacing {spacing} m gives {2 * np.prod(cells):.0f} points; make it larger"
+            f"spacing {spacing} m gives {2 * np.prod(cells):.3g} points; make it larger"
         )
     middle = 0.5 * (box[0] + box[1])
     return middle - 0.5 * spacing * cells, cells.astype(np.int64)
