@@ -18,7 +18,6 @@ from tissue import (
     FloatArray,
     FramePath,
     Geom,
-    Material,
     SolverSettings,
     Tissue,
     expect_toughness_in_range,
@@ -88,7 +87,7 @@ def make_tissue(scene: Scene) -> Tissue:
     attachments = _attached(tissue, scene.attachments)
     if fixed.any() or table is not None or attachments:
         tissue.settle()
-        _warn_of_collapse(tissue, scene.material)
+        _warn_of_collapse(tissue, scene)
     for attachment, row in zip(attachments, scene.attachments, strict=True):
         ends = math.inf if row.release_at is None else row.release_at
         attachment.follow(FramePath(times_of(row), row.displacements or (), release_at=ends))
@@ -149,8 +148,9 @@ def _attach(tissue: Tissue, table: AttachmentTable) -> Attachment:
     )
 
 
-def _warn_of_collapse(tissue: Tissue, material: Material) -> None:
+def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:
     """Say where a body that has settled has folded over, or has lost volume."""
+    material = scene.material
     inverted = tissue.cut_report().now.inverted
     pieces = tissue.pieces()
     volume = sum(piece.volume for piece in pieces) / sum(piece.rest_volume for piece in pieces)
@@ -159,11 +159,12 @@ def _warn_of_collapse(tissue: Tissue, material: Material) -> None:
     ways = ["--law neo_hookean"] if material.law == "springs" else []
     if material.poisson_ratio < _HARDLY_COMPRESSIBLE:
         ways.append(f"--poisson-ratio {_HARDLY_COMPRESSIBLE}")
-    ways += ["a larger --young", "less --stretch or --gravity"]
+    ways.append("a larger --young")
+    ways += ["less --stretch"] * (scene.stretch != 0.0) + ["less --gravity"] * (scene.gravity > 0.0)
     _log.warning(
-        "settled under gravity, %.2g %% of the tetrahedra are inside out, and the body has %.3g %% "
-        "of its volume: forces on a blade there mean little. What helps: %s, or a mesh without "
-        "flat tetrahedra",
+        "settled, %.2g %% of the tetrahedra are inside out, and the body has %.3g %% of its "
+        "volume: forces on a blade there mean little. What may help: %s, or a mesh without flat "
+        "tetrahedra",
         1e2 * inverted,
         1e2 * volume,
         ", ".join(ways),

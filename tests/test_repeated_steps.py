@@ -103,6 +103,15 @@ def test_a_body_that_cannot_go_on_stops_as_it_was_and_names_nodes(force, where):
     assert same(tissue, other)
 
 
+def test_a_body_that_was_left_not_finite_is_not_said_to_have_been_tried_in_shorter_steps():
+    tissue = in_mid_cut()
+    tissue.push([0], (0.0, 0.0, 0.1))  # a change: there is nothing to go back to
+    faults.inject(tissue, "positions", np.nan, np.random.default_rng(0))
+    with pytest.raises(TissueError, match=r"not finite before .*no step was taken") as error:
+        tissue.step(None, strokes.DT)
+    assert "did not help" not in str(error.value)
+
+
 def test_a_body_that_has_stopped_takes_no_change_until_a_state_is_loaded():
     tissue, other = in_mid_cut(), in_mid_cut()
     state = tissue.save_state()

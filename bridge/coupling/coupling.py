@@ -148,7 +148,7 @@ class Coupling:
         raise CouplingError(
             f"the tissue answered with a force of {list(wrench[:3])} N and a torque of "
             f"{list(wrench[3:])} N m at {list(point)} m, which is not finite: "
-            "its simulation has diverged. Try a smaller time step or a slower stroke"
+            "no arm can feel that. A smaller time step or a slower stroke may help"
         )
 
     def _count_implausible(self, force_size: float, torque_size: float) -> None:
@@ -159,8 +159,8 @@ class Coupling:
             raise CouplingError(
                 f"the tissue has answered with more than {MAX_PLAUSIBLE_FORCE:g} N or "
                 f"{MAX_PLAUSIBLE_TORQUE:g} N m for {MAX_IMPLAUSIBLE_FRAMES} frames in a row (now "
-                f"{force_size:.3g} N, {torque_size:.3g} N m): its simulation diverges. Try a "
-                "smaller time step or a slower stroke"
+                f"{force_size:.3g} N, {torque_size:.3g} N m), far beyond what a hand exerts. If "
+                "its motion is unstable, a smaller time step or a slower stroke may help"
             )
         self._watchdog.reset()
 

@@ -91,9 +91,10 @@ class MeshcatScene:
             self._draw_what_stays(scene)
             while (state := self._states.take()) is not None:
                 self._draw(scene, state)
-        except zmq.ZMQError:
+        except zmq.ZMQError as error:
+            fault = "does not answer" if isinstance(error, zmq.Again) else f"fails ({error})"
             _log.warning(
-                "meshcat's server at %s does not answer; nothing more is drawn there", self._address
+                "meshcat's server at %s %s; nothing more is drawn there", self._address, fault
             )
         finally:
             scene.window.zmq_socket.close()

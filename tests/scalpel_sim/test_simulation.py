@@ -223,6 +223,8 @@ def test_a_body_that_folds_as_it_settles_gets_a_warning_that_names_what_helps(ca
         r"--law neo_hookean, --poisson-ratio 0.45, a larger --young",
         caplog.text,
     )
+    assert "less --gravity" in caplog.text
+    assert ("less --stretch" in caplog.text) == (GRID2.stretch != 0.0)  # only what there is
 
 
 def test_springs_that_the_blade_would_fold_are_refused_before_the_body_settles(monkeypatch):

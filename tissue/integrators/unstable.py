@@ -2,8 +2,8 @@
 
 from tissue.types import TissueError
 
-REMEDY = "Use a shorter time step, or a material that is softer or heavier"
-"""What to do about it."""
+REMEDY = "A shorter time step, or a material that is softer or heavier, may help"
+"""What to try."""
 
 
 class UnstableError(TissueError):

@@ -79,7 +79,7 @@ class RepeatedSteps(SavedBody):
         is_finite = watch.is_finite(self._system)
         if self._is_changed:
             if not is_finite:
-                raise self._stop(_BEFORE, _worst_nodes(self._body))
+                raise self._stop(_BEFORE, _worst_nodes(self._body), is_repeated=False)
             self._save_step()
         inputs = inputs_of(sweep, dt, self._loads, self._attachments, self._system)
         if not is_finite:
@@ -185,18 +185,23 @@ class RepeatedSteps(SavedBody):
         self._watch.begin(system, *self._edge_now, audit.work_of_loads, residual)
         self._is_changed = False
 
-    def _stop(self, fault: str, nodes: IntArray) -> TissueError:
-        """Stop the body where it is; return the error that says why, and names nodes."""
+    def _stop(self, fault: str, nodes: IntArray, *, is_repeated: bool = True) -> TissueError:
+        """Stop the body where it is; return the error that says why, and names nodes.
+
+        `is_repeated`: whether the step was tried in shorter ones.
+        """
         x, n = self._body.positions, self.n_nodes
         places = ", ".join(
             f"{node} at ({x[node, 0]:.3g}, {x[node, 1]:.3g}, {x[node, 2]:.3g}) m"
             for node in nodes.tolist()
             if node < n
         )
+        tried = f"Steps of the integrator of 1/{2**MOST_REPEATS} the length did not help. {REMEDY}"
+        if not is_repeated:
+            tried = "What changed the tissue since the last step left it so; no step was taken"
         self._stopped = TissueError(
             f"the motion of the tissue became unstable: {fault}. The worst nodes, before this "
-            f"step: {places}. Steps of the integrator of 1/{2**MOST_REPEATS} the length did not "
-            f"help. {REMEDY}"
+            f"step: {places}. {tried}"
         )
         return self._stopped
 

@@ -33,10 +33,12 @@ def test_no_node_moves_farther_in_a_step_than_a_part_of_its_size(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("speed", [1e9, np.nan])
-def test_motion_that_became_unstable_ends_with_an_error_and_can_be_read(method, speed):
+@pytest.mark.parametrize(
+    ("speed", "said"), [(1e9, "A shorter time step"), (np.nan, "no step was taken")]
+)
+def test_motion_that_became_unstable_ends_with_an_error_and_can_be_read(method, speed, said):
     tissue = moving(speed, method)
-    with pytest.raises(TissueError, match=r"became unstable.* Use a shorter time step"):
+    with pytest.raises(TissueError, match=rf"became unstable.*{said}"):
         for _ in range(10):
             tissue.step(None, FRAME)
     assert tissue.snapshot().positions.shape == (tissue.n_nodes, 3)
