@@ -3,9 +3,11 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from time import sleep
 from typing import Any
@@ -42,6 +44,25 @@ def start(
     finally:
         for each in ignored:
             signal.signal(each, signal.SIG_IGN)
+
+
+def free_port() -> int:
+    """Return a port at which nothing listens."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+        return port
+
+
+@contextmanager
+def started_first(example: Path, port: int) -> Iterator[subprocess.Popen[str]]:
+    """Start an example before the server that it needs, and yield it once it waits for it."""
+    command = [sys.executable, "-I", str(example), str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
+        try:
+            assert "waiting for" in program.stdout.readline()
+            yield program
+        finally:
+            program.kill()
 
 
 def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:

@@ -40,15 +40,23 @@ class DeviceClient:
         address: Where the run waits, "HOST:PORT".
         period: How often poses will be sent [s]; the run counts those that miss it.
         key: Key that both sides share (`read_key`); None for a run on this machine without a key.
+        patience: Longest wait for a run that does not wait for a device yet [s].
 
     Raises:
         ValueError: the address is malformed, or of another machine and there is no key.
         LinkError: no run waits there, another device leads it, or it has another key.
     """
 
-    def __init__(self, address: str, *, period: float = 1e-3, key: bytes | None = None) -> None:
+    def __init__(
+        self,
+        address: str,
+        *,
+        period: float = 1e-3,
+        key: bytes | None = None,
+        patience: float = 0.0,
+    ) -> None:
         self._period = period
-        self._connection = Connection(address, _BLADE, DEVICE_ANSWER_SECONDS, key)
+        self._connection = Connection(address, _BLADE, DEVICE_ANSWER_SECONDS, key, patience)
         try:
             self.description = self._connection.ask(
                 MessageKind.HELLO, b"", LARGEST_DEVICE_DESCRIPTION, unpack_device_description

@@ -57,6 +57,7 @@ class TcpLink:
         timeout: Longest wait for an answer [s].
         key: Key that both sides share (`keys.read_key`); None for a server on this machine without
             a key.
+        patience: Longest wait for a server that does not listen yet [s].
 
     Raises:
         ValueError: the address is malformed, or of another machine and there is no key.
@@ -65,12 +66,17 @@ class TcpLink:
     """
 
     def __init__(
-        self, address: str, timeout: float = ANSWER_SECONDS, *, key: bytes | None = None
+        self,
+        address: str,
+        timeout: float = ANSWER_SECONDS,
+        *,
+        key: bytes | None = None,
+        patience: float = 0.0,
     ) -> None:
         self._n_led = 0
         self._loads: Sequence[FrameLoad] | None = None
         self._geom_loads = no_geom_loads(0)
-        self._connection = Connection(address, _TISSUE, timeout, key)
+        self._connection = Connection(address, _TISSUE, timeout, key, patience)
         try:
             self.describe()
         except BaseException:

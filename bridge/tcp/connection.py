@@ -1,6 +1,7 @@
 """A client's connection: requests, their replies, and the handshake with a key."""
 
 import contextlib
+import logging
 import socket
 import threading
 import time
@@ -16,10 +17,14 @@ from bridge.tcp.keepalive import keep_alive
 from bridge.tcp.messages.text import LARGEST_DESCRIPTION, LARGEST_ERROR, unpack_error
 from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
 
+_logger = logging.getLogger(__name__)
+
 _Value = TypeVar("_Value")
 
 CONNECT_SECONDS = 5.0
 """Longest wait for a connection [s]. On loopback it is there at once or not at all."""
+RETRY_SECONDS = 0.2
+"""Time between two tries where a server may not listen yet [s]."""
 ANSWER_SECONDS = 60.0
 """Longest wait for an answer [s]. A step takes a millisecond, but the first steps of a newly
 installed server compile."""
@@ -49,13 +54,21 @@ class Connection:
         served: What is there.
         timeout: Longest wait for an answer [s].
         key: Key that both sides share; None for a server on this machine without a key.
+        patience: Longest wait for a server that does not listen yet [s].
 
     Raises:
         ValueError: the address is malformed, or of another machine and there is no key.
         LinkError: there is no server at the address, or it has another version of the protocol.
     """
 
-    def __init__(self, address: str, served: Served, timeout: float, key: bytes | None) -> None:
+    def __init__(
+        self,
+        address: str,
+        served: Served,
+        timeout: float,
+        key: bytes | None,
+        patience: float = 0.0,
+    ) -> None:
         self._address, self._timeout = address, timeout
         self._where = f"{served.name} at {address}"
         self._sequence = 0
@@ -68,7 +81,7 @@ class Connection:
         """Called ten times a second while the owner waits for an answer. It may raise an error to
         end that; the connection can still be used, unless a request was only sent in part."""
         self._socket: socket.socket | None = _connect(
-            address, served, timeout, has_key=key is not None
+            address, served, timeout, patience, has_key=key is not None
         )
         try:
             if key is not None:
@@ -256,7 +269,9 @@ def _checked_nonce(payload: bytes) -> bytes:
     return payload
 
 
-def _connect(address: str, served: Served, timeout: float, *, has_key: bool) -> socket.socket:
+def _connect(
+    address: str, served: Served, timeout: float, patience: float, *, has_key: bool
+) -> socket.socket:
     """Return a connection that sends small messages at once.
 
     Raises:
@@ -272,7 +287,8 @@ def _connect(address: str, served: Served, timeout: float, *, has_key: bool) -> 
                 f"{address} is another machine, and that takes a key: give the key of its server "
                 "with --key FILE, or connect through an SSH tunnel"
             )
-        connection = _first_that_answers([where for *_, where in found], seconds)
+        places = [where for *_, where in found]
+        connection = _once_it_listens(places, seconds, patience, f"{served.missing} at {address}")
     except TimeoutError as cause:
         raise LinkError(f"no server answers at {address} within {seconds:g} s") from cause
     except ConnectionRefusedError as cause:
@@ -283,6 +299,33 @@ def _connect(address: str, served: Served, timeout: float, *, has_key: bool) -> 
     keep_alive(connection)
     connection.settimeout(min(timeout, WAIT_SECONDS))
     return connection
+
+
+def _once_it_listens(
+    addresses: list[Any], seconds: float, patience: float, missing: str
+) -> socket.socket:
+    """Return a connection to one of the addresses of a host, which may not listen yet.
+
+    Args:
+        addresses: Those of the host.
+        seconds: Longest wait for each connection [s].
+        patience: Longest wait for a host that refuses it [s].
+        missing: What it says meanwhile, once.
+
+    Raises:
+        OSError: no connection can be made.
+    """
+    end, is_said = time.monotonic() + patience, False
+    while True:
+        try:
+            return _first_that_answers(addresses, seconds)
+        except ConnectionRefusedError:
+            if time.monotonic() >= end:
+                raise
+        if not is_said:
+            _logger.warning("%s yet; waiting for it, up to %g s", missing, patience)
+            is_said = True
+        time.sleep(RETRY_SECONDS)
 
 
 def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:

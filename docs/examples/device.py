@@ -8,15 +8,25 @@ import zlib
 
 HELLO, ERROR, SERVO, MEASURED, END = 1, 6, 16, 17, 18
 PERIOD, SPEED, SECONDS = 1e-3, 0.02, 3.0  # s, m/s, s
-connection = socket.create_connection(("127.0.0.1", int([*sys.argv, "8767"][1])))
-connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+def connected(port):
+    """Return a connection to the run, which may still be getting ready."""
+    for k in range(240):  # two minutes
+        try:
+            return socket.create_connection(("127.0.0.1", port))
+        except ConnectionRefusedError:
+            if k == 0:
+                print(f"waiting for `scalpel-sim run --hand device` at port {port}", flush=True)
+            time.sleep(0.5)
+    sys.exit(f"no `scalpel-sim run --hand device` at port {port}")
 
 
 def ask(sequence, kind, payload=b""):
     """Return the payload of the reply to a request."""
     head = struct.pack("<4sHHIII", b"SCUT", 8, kind, sequence, len(payload), zlib.crc32(payload))
     connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
-    head = connection.recv(24, socket.MSG_WAITALL)
+    head = connection.recv(24, socket.MSG_WAITALL) or sys.exit("the run has gone")
     _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)
     reply = connection.recv(length, socket.MSG_WAITALL)
     if answer == ERROR or zlib.crc32(reply) != checksum:
@@ -24,6 +34,8 @@ def ask(sequence, kind, payload=b""):
     return struct.unpack("<15d3q2I", reply) if kind != HELLO else reply.decode()
 
 
+connection = connected(int([*sys.argv, "8767"][1]))
+connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 print(ask(0, HELLO))
 x, y, z, *turned = ask(1, MEASURED)[2:9]  # measured_cp
 start = time.monotonic()

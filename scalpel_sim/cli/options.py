@@ -39,6 +39,10 @@ _PAGE = Group("Page", sort_key=7)
 DEVICE = Group("Device", sort_key=8)
 OUTPUT = Group("Output", sort_key=9)
 
+SERVER_PATIENCE = 120.0
+"""Longest wait for a program that was started at the same time and does not listen yet [s]: where
+kernels are compiled first, that takes a minute."""
+
 
 @Parameter(name="*", group=_BODY)
 @dataclass(frozen=True)
@@ -196,7 +200,8 @@ class ClientOptions:
     """A tissue in another process."""
 
     connect: str | None = None
-    "HOST:PORT of a `scalpel-sim serve`, which holds the tissue [default: it is in this process]."
+    """HOST:PORT of a `scalpel-sim serve`, which holds the tissue, and may still get ready for
+    two minutes [default: it is in this process]."""
     key: Path | None = None
     "File with the key of that server [default: the key in SCALPEL_SIM_KEY, if that is set]."
 

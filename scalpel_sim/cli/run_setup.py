@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
 from scalpel_sim.cli.console import compiling
 from scalpel_sim.cli.options import (
+    SERVER_PATIENCE,
     ArmOptions,
     ClientOptions,
     MaterialOptions,
@@ -170,7 +171,7 @@ def _tissue_elsewhere(
             "`scalpel-sim serve`"
         )
     given = scene_in_file(name) if name is not None and is_toml_file(name) else None
-    link = TcpLink(address, key=chosen_key(options.client.key))
+    link = TcpLink(address, key=chosen_key(options.client.key), patience=SERVER_PATIENCE)
     try:
         scene = changed(scene_of(link, given), **_changes_of_scene(options.arm))
         if given is None and name not in (None, scene.name):

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from bridge import DEFAULT_DEVICE_PORT, DEFAULT_HOST
 from scalpel_sim.cli.console import log_to_stderr, say
-from scalpel_sim.cli.options import CONNECTION, PrintOptions
+from scalpel_sim.cli.options import CONNECTION, SERVER_PATIENCE, PrintOptions
 from scalpel_sim.errors import RunError
 from scalpel_sim.stop_signals import loading
 
@@ -23,7 +23,8 @@ def spacemouse(
 
     The blade moves and turns while the cap is deflected, along the axes of the world: to the right
     is +x, away from you +y, up +z. The left button lets go while it is pressed, the right one ends
-    the run. It needs `pip install scalpel-sim[spacemouse]` and the library hidapi.
+    the run. It waits two minutes for a run that still gets ready. It needs
+    `pip install scalpel-sim[spacemouse]` and the library hidapi.
 
     For example:
 
@@ -52,7 +53,9 @@ def spacemouse(
         convention = pyspacemouse.AxisConvention.HID_Z_UP
         with pyspacemouse.open(axis_convention=convention) as mouse:
             secret = chosen_key(key)
-            with DeviceClient(address, period=SPACEMOUSE_PERIOD, key=secret) as client:
+            with DeviceClient(
+                address, period=SPACEMOUSE_PERIOD, key=secret, patience=SERVER_PATIENCE
+            ) as client:
                 if not printing.quiet:
                     say(f"{mouse.name} leads the blade in {client.description.scene}")
                 try:

@@ -47,10 +47,12 @@ class NotedBlade:
 
 
 @contextlib.contextmanager
-def served_blade(key=None):
+def served_blade(key=None, port=0):
     """Yield a blade, and the address at which a device can lead it."""
     blade, stops = NotedBlade(), threading.Event()
-    with DeviceServer(blade, DeviceDescription("organ", 0.04, 0.2, 2.0), port=0, key=key) as server:
+    with DeviceServer(
+        blade, DeviceDescription("organ", 0.04, 0.2, 2.0), port=port, key=key
+    ) as server:
 
         def serve():
             while not stops.is_set():

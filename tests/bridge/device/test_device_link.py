@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from bridge.device.messages import ServoRequest, pack_servo
 from bridge.tcp.wire import MessageKind, pack_frame
 from tests.bridge.device.served_blade import ORIGIN, POSE, STATE, UNTURNED, served_blade
 from tests.bridge.tcp.bare_sockets import HELLO, connected, read_one
+from tests.processes import free_port, started_first
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "device.py"
 KEY = bytes(range(32))
@@ -192,11 +194,34 @@ def test_a_client_of_forty_lines_leads_the_blade_and_prints_its_force(served):
     assert ys[-1] == pytest.approx(0.2 + 0.06, abs=1e-3), "3 s at 20 mm/s from where the blade was"
 
 
-def test_the_client_is_forty_lines_and_imports_only_the_standard_library():
+def test_the_client_is_fifty_lines_and_imports_only_the_standard_library():
     text = EXAMPLE.read_text()
-    assert text.count("\n") <= 40
+    assert len([line for line in text.splitlines() if line.strip()]) <= 50
     imported = re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE)
     assert set(imported) <= set(sys.stdlib_module_names)
+
+
+def test_the_client_waits_for_a_run_that_gets_ready_meanwhile():
+    port = free_port()
+    with started_first(EXAMPLE, port) as client, served_blade(port=port):
+        assert "organ" in client.stdout.readline()
+
+
+def test_a_device_with_patience_waits_for_a_run_and_says_so_once(caplog):
+    port = free_port()
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(DeviceClient, f"127.0.0.1:{port}", patience=60.0)
+        while "yet; waiting for it" not in caplog.text:
+            time.sleep(0.01)
+        with served_blade(port=port), asked.result(60.0) as client:
+            assert client.measured().time == STATE.time
+    assert caplog.text.count("no run waits for a device") == 1
+
+
+def test_a_device_whose_patience_ends_says_that_there_is_no_run(monkeypatch):
+    monkeypatch.setattr("bridge.tcp.connection.RETRY_SECONDS", 1e-3)
+    with pytest.raises(LinkError, match="no run waits for a device at"):
+        DeviceClient(f"127.0.0.1:{free_port()}", patience=0.02)
 
 
 def test_the_client_prints_why_the_run_refuses_it():

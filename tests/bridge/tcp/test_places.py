@@ -44,7 +44,7 @@ SILENCE = 0.6
 @contextlib.contextmanager
 def server_in_a_thread(**options):
     """Yield a server of the block in this process, where its limits can be changed."""
-    server = TissueServer(block_tissue, port=0, **options)
+    server = TissueServer(block_tissue, **{"port": 0} | options)
     stops = threading.Event()
 
     def serve():

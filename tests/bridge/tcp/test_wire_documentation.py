@@ -33,6 +33,8 @@ from bridge.tcp.single_client import MAX_STRANGERS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.device.served_blade import STATE
 from tests.bridge.tcp.serve_block import block_tissue
+from tests.bridge.tcp.test_places import server_in_a_thread
+from tests.processes import free_port, started_first
 from tissue import Energies, RigidContacts
 from tissue.contact.geoms.geom_contact import MOST_INCREMENTS
 
@@ -48,7 +50,7 @@ def run_client(port):
     )
 
 
-def test_a_client_of_thirty_lines_cuts_the_tissue_and_prints_its_force(server):
+def test_a_client_of_forty_lines_cuts_the_tissue_and_prints_its_force(server):
     done = run_client(parse_address(server.address)[1])
     assert (done.returncode, done.stderr) == (0, "")
     rows = re.findall(r"(\d+) ms: ([+-][\d.]+) N along y, (\d+) mm2 cut", done.stdout)
@@ -57,11 +59,17 @@ def test_a_client_of_thirty_lines_cuts_the_tissue_and_prints_its_force(server):
     assert float(rows[-1][2]) == pytest.approx(20 * 20, rel=0.05)
 
 
-def test_the_client_is_thirty_lines_and_imports_only_the_standard_library():
+def test_the_client_is_forty_lines_and_imports_only_the_standard_library():
     lines = [line for line in CLIENT.read_text().splitlines() if line.strip()]
-    assert len(lines) <= 30
+    assert len(lines) <= 40
     imported = re.findall(r"^(?:import|from) (\w+)", CLIENT.read_text(), re.MULTILINE)
     assert set(imported) <= set(sys.stdlib_module_names)
+
+
+def test_the_client_waits_for_a_server_that_gets_ready_meanwhile():
+    port = free_port()
+    with started_first(CLIENT, port) as client, server_in_a_thread(port=port):
+        assert client.stdout.readline().startswith("100 ms: ")
 
 
 def test_the_client_prints_why_the_server_refuses_it(start_server):

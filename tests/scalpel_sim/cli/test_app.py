@@ -246,7 +246,19 @@ def test_wrong_use_gets_one_line_and_exit_code_2(case, files, capsys):
     assert "Traceback" not in err
 
 
-def test_an_unreachable_server_is_a_failed_run(files, capsys):
+def test_a_run_that_starts_before_its_server_waits_for_it_and_says_so(monkeypatch, capsys):
+    monkeypatch.setattr("scalpel_sim.cli.run_setup.SERVER_PATIENCE", 0.3)
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
+    assert command_line(["run", "--connect", address]) == 1
+    waits, failed = capsys.readouterr().err.splitlines()
+    assert f"no tissue is served at {address} yet; waiting for it, up to 0.3 s" in waits
+    assert failed.startswith(f"error: no tissue is served at {address}")
+
+
+def test_an_unreachable_server_is_a_failed_run(files, monkeypatch, capsys):
+    monkeypatch.setattr("scalpel_sim.cli.run_setup.SERVER_PATIENCE", 0.0)
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{unused.getsockname()[1]}"
