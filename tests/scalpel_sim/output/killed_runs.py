@@ -1,6 +1,7 @@
 """Runs that are killed in this process, go on, and are compared with whole ones."""
 
 import json
+from collections import deque
 
 import numpy as np
 import pytest
@@ -83,18 +84,23 @@ def expect_same(folder, whole):
 
 
 def led(folder, n_frames, *commands):
-    """Do a run that a hand leads, and that is killed; what it does is drawn from a seed."""
+    """Do a run that a hand leads, and that is killed; what it does is drawn from a seed.
+
+    Args:
+        folder: Where its files go.
+        n_frames: Frames after which it is killed.
+        commands: Commands of a page, each after the number of frames after which it comes.
+    """
     scene = SCENES["grid2"]
     simulation = prepare(scene, is_led=True)
     hand = LiveHand(simulation, seconds=10.0, clock=lambda: 0.0)
     controls = controls_of(simulation, hand)
-    lead, kill = through_the_body(hand), at(n_frames)
+    lead, kill, later = through_the_body(hand), at(n_frames), deque(commands)
 
     def after_frame(now):
         lead(now)
-        for n, command in commands:
-            if n == len(now.recording):
-                controls.commands.append(command)
+        if later and later[0][0] == len(now.recording):
+            controls.commands.append(later.popleft()[1])
         kill(now)
 
     with pytest.raises(Killed):

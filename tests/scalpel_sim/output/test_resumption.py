@@ -9,7 +9,7 @@ import pytest
 
 from scalpel_sim import SCENES
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.hands.commands import Engage, Undo
+from scalpel_sim.hands.commands import Engage, Release, Undo
 from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
 from scalpel_sim.output.recording import COLUMNS, Recording, read_forces
 from scalpel_sim.output.resumption import resumption_of
@@ -201,6 +201,8 @@ def test_what_a_hand_did_is_done_again_from_the_last_checkpoint(tmp_path):
 
 
 def test_a_checkpoint_of_what_was_undone_is_gone(tmp_path):
-    led(tmp_path, 330, (100, Engage()), (320, Undo()))
-    found = resumption_of(tmp_path)
-    assert found.n_frames <= len(found.recorded)
+    led(tmp_path, 330, (100, Release()), (110, Engage()), (320, Undo()))  # back to 110
+    then, found = physics(tmp_path), resumption_of(tmp_path)
+    assert found.n_frames <= len(found.recorded) == len(then)
+    resume_in(tmp_path)
+    assert np.array_equal(physics(tmp_path)[: len(then)], then, equal_nan=True)
