@@ -1,8 +1,8 @@
 """Compiles the kernels that scenes need, in several processes, and loads them.
 
-    python -m scalpel_sim.warm_up motion|cut KERNELS
+    python -m scalpel_sim.warm_up motion|cut|all KERNELS...
 
-is one of the processes; KERNELS is a `KernelSet` as JSON.
+is one of the processes; each of KERNELS is a `KernelSet` as JSON.
 """
 
 import gc
@@ -11,10 +11,11 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -136,64 +137,51 @@ def compile_ahead(sets: Sequence[KernelSet], on_progress: Progress = lambda n, n
     """Compile the kernels of some sets by all cores, where the cache does not have them.
 
     Two processes compile the first set, and with it most of what the others share; then as many as
-    there are cores compile the others. The cache passes on the binaries. What they do not compile
-    is compiled where it is used.
+    there are cores compile the others, each a share of them. The cache passes on the binaries. What
+    they do not compile is compiled where it is used.
     """
     missing = [kernels for kernels in sets if not kernels_are_compiled(kernels)]
     if not (missing and is_compiling()):
         return
-    n_cores = max(os.cpu_count() or 1, len(_JOBS))
-    with _Processes() as processes, StopSignals() as stop:
-        for group in (missing[:1], missing[1:]):
-            waiting = [(job, kernels) for kernels in group for job in _JOBS]
-            while waiting or processes.n_running:
-                if stop.reason is not None:
-                    raise SignalInterrupt(stop.reason)
-                while waiting and processes.n_running < n_cores:
-                    processes.start(*waiting.pop(0))
-                found = n_compiled_kernels()
-                on_progress(found, max(found, USUAL_NUMBER))
-                time.sleep(_SECONDS_PER_LOOK)
-        done = [kernels for kernels in missing if processes.have_done(kernels)]
-    for kernels in done:
-        _note(kernels)
-    if done == missing:
+    first, others, n_cores = missing[:1], missing[1:], os.cpu_count() or 1
+    shares = [share for i in range(n_cores) if (share := others[i::n_cores])]
+    are_done = True
+    with StopSignals() as stop:
+        for tasks in ([(job, first) for job in _JOBS], [(_EVERY_JOB, share) for share in shares]):
+            with _processes(tasks) as processes:
+                while any(process.poll() is None for process in processes):
+                    if stop.reason is not None:
+                        raise SignalInterrupt(stop.reason)
+                    found = n_compiled_kernels()
+                    on_progress(found, max(found, USUAL_NUMBER))
+                    time.sleep(_SECONDS_PER_LOOK)
+                are_done &= not any(process.returncode for process in processes)
+    if are_done:
         found = n_compiled_kernels()
         on_progress(found, found)
+        for kernels in missing:
+            _note(kernels)
 
 
-class _Processes:
-    """Processes that compile; those that still run are ended where this one is interrupted."""
-
-    def __init__(self) -> None:
-        self._started: list[tuple[KernelSet, subprocess.Popen[bytes]]] = []
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for _kernels, process in self._started:
-            process.kill()
-            process.wait()
-
-    @property
-    def n_running(self) -> int:
-        """Number of processes that have not ended."""
-        return sum(process.poll() is None for _, process in self._started)
-
-    def start(self, job: str, kernels: KernelSet) -> None:
-        """Start a process that does one of `_JOBS` for a set."""
-        process = subprocess.Popen(
-            [sys.executable, "-m", "scalpel_sim.warm_up", job, json.dumps(kernels)],
+@contextmanager
+def _processes(
+    tasks: Sequence[tuple[str, Sequence[KernelSet]]],
+) -> Iterator[list["subprocess.Popen[bytes]"]]:
+    """Start a process for each job and its sets, and end them where this one is interrupted."""
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-m", "scalpel_sim.warm_up", job, *map(json.dumps, sets)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        self._started.append((kernels, process))
-
-    def have_done(self, kernels: KernelSet) -> bool:
-        """Return whether all jobs of a set have ended well."""
-        codes = [process.returncode for each, process in self._started if each == kernels]
-        return len(codes) == len(_JOBS) and not any(codes)
+        for job, sets in tasks
+    ]
+    try:
+        yield started
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
 
 
 def _mark(kernels: KernelSet) -> Path:
@@ -296,8 +284,18 @@ def _edge(fraction: float) -> BladeSegment:
 
 _JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move, "cut": _incise_and_cut}
 """What two processes do for a set. Each takes half of the time."""
+_EVERY_JOB = "all"
+"""Name of all jobs, one after the other."""
+
+
+def _main(job: str, *sets: str) -> None:
+    """Do a job for sets that are given as JSON."""
+    gc.disable()  # the compiler makes millions of objects and few cycles
+    for kernels in sets:
+        for name, compile_part in _JOBS.items():
+            if job in (name, _EVERY_JOB):
+                compile_part(KernelSet(*json.loads(kernels)))
 
 
 if __name__ == "__main__":
-    gc.disable()  # the compiler makes millions of objects and few cycles
-    _JOBS[sys.argv[1]](KernelSet(*json.loads(sys.argv[2])))
+    _main(*sys.argv[1:])
