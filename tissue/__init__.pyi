@@ -15,6 +15,7 @@ from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
 from .core.limits import LARGEST_COORDINATE as LARGEST_COORDINATE
 from .core.limits import LARGEST_STRENGTH as LARGEST_STRENGTH
+from .core.limits import MANY_SUBSTEPS as MANY_SUBSTEPS
 from .core.limits import MOST_SUBSTEPS as MOST_SUBSTEPS
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
@@ -106,6 +107,7 @@ __all__ = [
     "Ligament",
     "Load",
     "MATERIALS",
+    "MANY_SUBSTEPS",
     "MOST_SUBSTEPS",
     "Material",
     "MaterialPoints",

@@ -49,6 +49,16 @@ class CutSettings:
                 )
 
 
+LEAST_UNDAMPED = 1.6
+"""Least frequency times step of the methods where nothing is damped: Verlet's 2, with its safety of
+0.8."""
+
+
+def undamped_steps(frequency: float, seconds: float) -> float:
+    """Return how many steps a body of an angular frequency [1/s] takes at most without damping."""
+    return frequency * seconds / LEAST_UNDAMPED
+
+
 class MeshMeasures(NamedTuple):
     """Size of a mesh and what limits its time step, at one instant."""
 
@@ -66,6 +76,10 @@ class MeshMeasures(NamedTuple):
     """The most that it had added so far, as a share of the body's own."""
     inverted: float
     """Tetrahedra that are inside out, as a share of all: forces around them mean little."""
+
+    def undamped_steps(self, seconds: float) -> float:
+        """Return how many steps such a time [s] takes at most if nothing is damped."""
+        return undamped_steps(self.frequency, seconds)
 
 
 class CutReport(NamedTuple):

@@ -2,18 +2,15 @@
 
 import math
 
-from tissue.core.limits import MOST_SUBSTEPS
-from tissue.integrators.stability import SAFETY, VERLET_LIMIT, stable_step
+from tissue.core.limits import MANY_SUBSTEPS, MOST_SUBSTEPS
+from tissue.cut_settings import undamped_steps
+from tissue.integrators.stability import stable_step
 from tissue.integrators.system import System
 
 _SURELY_FEW = 0.1
 """Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
 longest step need not be computed. It takes some 1.3 steps at most for each of them, by
 `stability.STABILITY_LIMIT`."""
-
-DAMPED = 0.5 * VERLET_LIMIT
-"""Frequency times the longest step, over the safety, below which it is damping that makes steps
-short: half of the least that any of the methods takes without damping."""
 
 
 def expect_few_steps(system: System, method: int, dt: float) -> None:
@@ -38,10 +35,10 @@ def expect_few_steps(system: System, method: int, dt: float) -> None:
     if dt <= MOST_SUBSTEPS * step:
         return
     reason = "its elements are small, stiff or light"
-    if math.sqrt(squared) * step < DAMPED * SAFETY:
-        reason = "damping in it, or of what is attached to it, is strong"
+    if undamped_steps(math.sqrt(squared), dt) <= MANY_SUBSTEPS:
+        reason = "damping in it is strong"
     elif of_holds > of_body:
-        reason = "what is attached to it is held stiffly"
+        reason = "what is attached to it is held stiffly, or damped strongly"
     raise ValueError(
         f"a time step of {dt:.3g} s takes some {dt / step:.3g} steps of the integrator in this "
         f"tissue, because {reason}; at most {MOST_SUBSTEPS:,} are done. Take time steps of at most "
