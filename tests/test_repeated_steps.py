@@ -76,6 +76,19 @@ def test_going_back_by_steps_gives_the_same_bits_whatever_drives_the_body(last):
     assert same(tissue, other.tissue)
 
 
+def test_going_back_to_before_a_line_touched_the_body_loses_no_step():
+    spoiled, other = (Tissue(MESH, SOLID, fixed=bodies.sides(MESH)) for _ in range(2))
+    for i, sweep in enumerate(STROKE[:MIDDLE]):
+        if i == 3:
+            spoiled._save_step()  # as after so many steps
+        if i % 50 == 49:
+            what = (spoiled._loads, spoiled._attachments, spoiled._system)
+            spoiled._go_back(inputs_of(sweep, strokes.DT, *what))
+        results = [tissue.step(sweep, strokes.DT) for tissue in (spoiled, other)]
+    assert results[0].cut_area == results[1].cut_area > 0.0
+    assert same(spoiled, other)
+
+
 @pytest.mark.parametrize("relaxation", ["global", "verlet"])
 @pytest.mark.parametrize("where", ["positions", "velocities"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e3])
