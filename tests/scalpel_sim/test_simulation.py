@@ -67,10 +67,22 @@ def test_the_blade_starts_on_the_stroke_and_stays_near_it():
 
 def test_the_garbage_collector_is_off_during_a_run_and_on_after_it():
     simulation = prepare(GRID2)
-    seen = []
+    seen, n_frozen = [], gc.get_freeze_count()
     simulation.run(0.005, lambda now: seen.append(gc.isenabled()))
     assert seen == [False] * 5
-    assert gc.isenabled() and gc.get_freeze_count() == 0
+    assert gc.isenabled() and gc.get_freeze_count() == n_frozen
+
+
+def test_a_run_does_not_search_the_process_for_garbage():
+    """With a million objects that takes longer than a hundred frames."""
+    simulation = prepare(GRID2)
+    collections = []
+    gc.callbacks.append(lambda phase, found: collections.append(phase))
+    try:
+        simulation.run(0.001)
+    finally:
+        gc.callbacks.pop()
+    assert not collections
 
 
 def test_the_stages_of_a_frame_take_no_longer_than_the_frame():

@@ -10,7 +10,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.relaxation import (
-    FIRST_STAGE,
+    FIND_FACES,
     NOT_FINITE,
     RELAXED,
     UNSTABLE,
@@ -123,7 +123,7 @@ class GlobalStepper:
             choice = self._find_contacts(system, increment, choice)
         if self._threads is not None:
             self._threads.join(system.context)
-        stage = FIRST_STAGE
+        stage = FIND_FACES
         while True:
             arrays = self._arrays(system, blade, choice, stage)
             outcome = self._relax.call(arrays, edge, has_blade, dt, begin, end)

@@ -38,7 +38,7 @@ NOT_FINITE: Final = -1
 UNSTABLE: Final = -2
 """The motion became unstable; the increment is not done."""
 
-FIRST_STAGE: Final = 0
+FIND_FACES: Final = 0
 """Stage in which an increment begins: the search for faces."""
 _STEPS, _ANCHORS, _ANCHORS_AGAIN = 1, 2, 3
 """Those that follow; the last one where the grid was full, and is new now."""
@@ -134,7 +134,7 @@ def _begin(
     relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
 ) -> int:
     """Find the faces that the blade may touch, and begin the steps; return what needs room."""
-    if relaxation.stage != FIRST_STAGE:
+    if relaxation.stage != FIND_FACES:
         return RELAXED
     if relaxation.has_faces == 1:
         if has_blade:
@@ -154,7 +154,7 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
     """Do what follows the steps; return RELAXED, or what went wrong, or what needs room."""
     step, choice = relaxation.step, relaxation.choice
     if relaxation.stage == _STEPS:
-        relaxation.stage = FIRST_STAGE
+        relaxation.stage = FIND_FACES
         if choice.is_unstable == 1:
             return UNSTABLE
         if choice.done > 0:
@@ -173,5 +173,5 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
         if outcome == GRID_IS_FULL:
             relaxation.stage = _ANCHORS_AGAIN
             return GRID_IS_FULL
-    relaxation.stage = FIRST_STAGE
+    relaxation.stage = FIND_FACES
     return RELAXED

@@ -1,4 +1,5 @@
 import csv
+import functools
 import json
 import re
 from pathlib import Path
@@ -40,17 +41,16 @@ CUT_REPORT = CutReport(
     now=MeshMeasures(9, 4e-4, 3000.0, 5e-4, 1e-3, 2e-3, 2 / 9),
 )
 
-PIECES = pieces_of(
-    Snapshot(
-        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
-        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
-        np.zeros((8, 3)),
-        np.ones(8),
-        np.array([[3, 0, 1, 2], [7, 4, 5, 6]]),
-        np.arange(8) == 4,
+
+@functools.cache
+def pieces():
+    """Return two tetrahedra, the second of which is held."""
+    corners = np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)])
+    tetrahedra = np.array([[3, 0, 1, 2], [7, 4, 5, 6]])
+    is_held = np.arange(8) == 4
+    return pieces_of(
+        Snapshot(corners, corners.copy(), np.zeros((8, 3)), np.ones(8), tetrahedra, is_held)
     )
-)
-"""Two tetrahedra, the second of which is held."""
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def summary_of(
             wall_seconds=wall_seconds,
             tetrahedra_initial=6,
             tetrahedra_final=8,
-            pieces=PIECES,
+            pieces=pieces(),
             quality=CUT_REPORT,
             asked_area=2.5e-4,
             counters=counters,

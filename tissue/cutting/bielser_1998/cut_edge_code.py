@@ -23,11 +23,12 @@ A face that the tip pierced and of which no edge is cut (state 3 of the paper) h
 
 
 def code_of(*edges: str) -> int:
-    """Return the code of the edges with these names, for example "AB" and "BC"."""
-    code = 0
-    for name in edges:
-        code |= 1 << bit_of(edge_named(name))
-    return code
+    """Return the code of the edges with these names, for example "AB" and "BC".
+
+    The table of cases is made of codes as it is imported, so no kernel is called for its bits.
+    """
+    numbers = {edge_named(name) for name in edges}
+    return int("".join("1" if edge in numbers else "0" for edge in range(len(EDGES))), 2)
 
 
 def edge_named(name: str) -> int:

@@ -1,5 +1,7 @@
 """The ring of a node is its distance in edges from the focus."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -15,13 +17,21 @@ from tissue.integrators.hierarchical.node_rings import (
 
 pytestmark = pytest.mark.kernel
 
-NETWORK = block(3, held=False)
-N_NODES = len(NETWORK.body.rest)
+N_NODES = 4**3
+
+
+@functools.cache
+def network():
+    return block(3, held=False)
+
+
+def test_the_network_has_four_nodes_along_each_side():
+    assert len(network().body.rest) == N_NODES
 
 
 def edges_apart(start: int) -> list[int]:
     """Return the distance of every node from `start` in edges, by matrix powers."""
-    springs = NETWORK.springs
+    springs = network().springs
     joined = np.eye(N_NODES, dtype=bool)
     for i in range(N_NODES):
         first = springs.first[i]
@@ -35,19 +45,19 @@ def edges_apart(start: int) -> list[int]:
 
 @pytest.mark.parametrize("start", [0, 21, N_NODES - 1])
 def test_the_ring_of_a_node_is_its_distance_in_edges(start):
-    rings = rings_around(NETWORK, start, N_NODES)
+    rings = rings_around(network(), start, N_NODES)
     assert [ring_of(rings, i) for i in range(N_NODES)] == edges_apart(start)
 
 
 def test_nodes_come_ring_by_ring_and_each_once():
-    rings = rings_around(NETWORK, 21, N_NODES)
+    rings = rings_around(network(), 21, N_NODES)
     order = found_nodes(rings)
     assert sorted(order) == list(range(N_NODES))
     assert (np.diff(rings.ring[order]) >= 0).all()
 
 
 def test_a_search_ends_at_its_last_ring():
-    rings = rings_around(NETWORK, 21, 1)
+    rings = rings_around(network(), 21, 1)
     assert {ring_of(rings, i) for i in found_nodes(rings)} == {0, 1}
     expected = [i for i, ring in enumerate(edges_apart(21)) if ring <= 1]
     assert sorted(found_nodes(rings)) == expected
@@ -55,7 +65,7 @@ def test_a_search_ends_at_its_last_ring():
 
 
 def test_a_new_search_discards_the_last():
-    rings = rings_around(NETWORK, 0, 1)
+    rings = rings_around(network(), 0, 1)
     begin_search(rings)
     add_focus(rings, N_NODES - 1)
     add_focus(rings, N_NODES - 1)
@@ -66,5 +76,5 @@ def test_a_new_search_discards_the_last():
 def test_a_search_without_a_focus_finds_nothing():
     rings = new_rings(N_NODES)
     begin_search(rings)
-    search(rings, NETWORK.springs, 5)
+    search(rings, network().springs, 5)
     assert rings.n_found == 0
