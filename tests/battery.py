@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import pytest
 
-WITHOUT_BATTERIES = "not long"
-"""The tests that `pytest` runs, as `addopts` has it; `pytest -m long` runs the others."""
+WITHOUT_BATTERIES = "not (long or end_to_end)"
+"""The tests that `pytest` runs, as `addopts` has it; `-m "long or end_to_end"` runs the others."""
 
 MOST_FAILURES = 20
 """Failing cases after which a group of cases ends: enough to see what they have in common."""

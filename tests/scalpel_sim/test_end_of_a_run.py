@@ -20,6 +20,8 @@ from tests.run_files import names_in
 from tests.small_disk import run_on_a_small_disk
 from tests.whole_runs import broken_files
 
+pytestmark = pytest.mark.end_to_end
+
 LONG = ("--seconds", "1000")
 
 

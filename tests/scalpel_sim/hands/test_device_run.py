@@ -17,6 +17,8 @@ from scalpel_sim.output.recording import COLUMNS, read_forces
 from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from tests.scalpel_sim.hands.device_runs import lead_forwards
 
+pytestmark = pytest.mark.end_to_end
+
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
 

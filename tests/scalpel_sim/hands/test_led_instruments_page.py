@@ -20,6 +20,8 @@ from tests.scalpel_sim.hands.test_led_page import (
     until_the_tip_rests,
 )
 
+pytestmark = pytest.mark.end_to_end
+
 SHEET = str(Path(__file__).parent / "sheet.toml")
 
 B, X, RIGHT_TRIGGER = 1, 2, 7

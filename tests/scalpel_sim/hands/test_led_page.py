@@ -12,6 +12,8 @@ from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from tests.browser import new_tab
 from tests.scalpel_sim.hands.led_view import LedView
 
+pytestmark = pytest.mark.end_to_end
+
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
 

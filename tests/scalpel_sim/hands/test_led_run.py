@@ -13,6 +13,8 @@ from scalpel_sim.output.run_folder import FINAL, FORCES, STROKE, SUMMARY
 from scalpel_sim.run import REST_AFTER_STROKE
 from tests.scalpel_sim.hands.led_view import LedView, page_of, token_in
 
+pytestmark = pytest.mark.end_to_end
+
 SECONDS = 0.4
 """How long the hand leads [s]."""
 

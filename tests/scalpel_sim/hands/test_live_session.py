@@ -4,10 +4,14 @@ import asyncio
 import json
 import time
 
+import pytest
+
 from scalpel_sim import read_scene
 from scalpel_sim.output.run_folder import SCENE, STROKE, SUMMARY
 from tests.scalpel_sim.hands.led_view import LedView, LiveView, document, page_of, token_in
 from tissue import MATERIALS
+
+pytestmark = pytest.mark.end_to_end
 
 PATIENCE = 60.0
 """How long a run may take to begin [s]: the machine may be busy."""

@@ -7,6 +7,8 @@ from tests.browser import new_tab
 from tests.scalpel_sim.hands.led_view import LedView, LiveView
 from tests.scalpel_sim.hands.test_led_page import drag, tip, until_it_rests
 
+pytestmark = pytest.mark.end_to_end
+
 TIME = "lastReadings?.time"
 """The simulated time that the page shows [s]."""
 

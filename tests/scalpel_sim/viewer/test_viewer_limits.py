@@ -18,6 +18,8 @@ from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 from tests.scalpel_sim.viewer.test_viewer import Run
 
+pytestmark = pytest.mark.end_to_end
+
 PATIENCE = 20.0
 CLOSE = 0x88
 """First byte of the frame by which a web socket is closed."""
