@@ -435,6 +435,7 @@ def test_help_and_version_are_no_errors(words, capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.end_to_end
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     folder = tmp_path / "run"
@@ -454,6 +455,7 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     assert names_in(folder) == sorted(RUN_FILES)
 
 
+@pytest.mark.end_to_end
 def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
     program = start("run", "grid2", "--seconds", "1000", "--out", str(tmp_path))
     forces = tmp_path / "forces.csv"
@@ -498,6 +500,7 @@ def test_the_arm_cuts_the_organ_in_two(tmp_path, stroke):
     assert json.loads((tmp_path / "summary.json").read_text())["pieces"] == 2
 
 
+@pytest.mark.end_to_end
 def test_view_shows_the_run_and_stays_until_it_is_interrupted(tmp_path):
     program = start("view", "grid2", "--seconds", "0.3", "--out", str(tmp_path))
     log = ""
@@ -515,6 +518,7 @@ def test_view_shows_the_run_and_stays_until_it_is_interrupted(tmp_path):
     assert "tetrahedra after" in out
 
 
+@pytest.mark.end_to_end
 def test_view_waits_for_enter_at_a_terminal(tmp_path):
     ours, theirs = pty.openpty()
     program = start("view", "grid2", "--seconds", "0.1", "--out", str(tmp_path), stdin=theirs)
