@@ -34,7 +34,7 @@ _LEAST_MOTION: Final = 1e-6
 
 
 class Miss(NamedTuple):
-    """What an edge lacks to a pose, world frame."""
+    """Displacement and turn that an edge lacks to a pose, world frame."""
 
     shift: FloatArray
     """From where its middle is to where it should be [m], shape (3,)."""
@@ -62,7 +62,7 @@ class Followed(NamedTuple):
     last: FloatArray
     """Configuration at the last pose that was tried."""
     miss: Miss
-    """What the edge lacks there."""
+    """Displacement and turn that the edge lacks there."""
     number: int
     """Number of that pose."""
 

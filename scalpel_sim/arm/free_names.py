@@ -34,7 +34,7 @@ KINDS = (
 """Kinds of elements of a model as `MjSpec` lists them. In each a name may occur once."""
 
 _OURS = "scalpel_sim_"
-"""What stands before a name that the user's model has already."""
+"""Prefix of a name that the user's model has already."""
 
 
 def free_prefix(spec: mujoco.MjSpec, names: Mapping[str, Iterable[str]], usual: str = "") -> str:

@@ -14,7 +14,7 @@ from tissue import BladeSegment, FloatArray, Wrench
 _FILE = Path(__file__).parent / "assets" / "grasper.xml"
 
 GRASPER = "grasper_"
-"""What the names of its parts begin with in the model of its arm, where those are free."""
+"""Prefix of the names of its parts in the model of its arm, where those are free."""
 
 PADS_HEEL, PADS_TIP = "heel", "tip"
 """Sites where the pads begin and end, after that prefix: a hand holds it half way between them."""

@@ -25,15 +25,15 @@ class HeldArm(NamedTuple):
     quaternion: FloatArray
     """How it is turned there (w, x, y, z)."""
     of_hand: str
-    """What the names of its hand begin with in its model."""
+    """Prefix of the names of its hand in its model."""
     of_grasper: str = GRASPER
-    """What the names of its grasper begin with in its model."""
+    """Prefix of the names of its grasper in its model."""
     workspace: FloatArray | None = None
     """Lowest and highest place where a hand may lead the middle of the pads [m], tissue frame,
     shape (2, 3); None: it follows a script."""
 
     def stand_in(self, spec: mujoco.MjSpec) -> str:
-        """Have it stand in the world of a model that is yet to be compiled.
+        """Stand it in the world of a model that is yet to be compiled.
 
         What its own world has to look at, planes and lights, is left out, and so are keyframes:
         in a model of more joints they have too few numbers. It collides with the other arms.

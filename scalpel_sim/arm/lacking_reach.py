@@ -1,4 +1,4 @@
-"""What an arm of the user's own lacks to reach a stroke, and where it would reach it."""
+"""The distance that an arm of the user's own lacks to a stroke, and where it would reach it."""
 
 import math
 from collections.abc import Sequence

@@ -9,7 +9,7 @@ class Standing(Protocol):
     """An arm, a table, a fixture: anything that can be put into a model."""
 
     def stand_in(self, spec: mujoco.MjSpec) -> str:
-        """Have it stand in the world of a model that is yet to be compiled.
+        """Stand it in the world of a model that is yet to be compiled.
 
         Returns:
             What it is called there, where the model may have had its usual name: the name of its

@@ -36,7 +36,7 @@ class StandingFixture(NamedTuple):
     """Its shape, world frame."""
 
     def stand_in(self, spec: mujoco.MjSpec) -> str:
-        """Have it stand in the world of a model that is yet to be compiled. It does not move.
+        """Stand it in the world of a model that is yet to be compiled. It does not move.
 
         A mesh becomes a thin plate for each triangle: as one geom it would be its convex hull.
 

@@ -34,7 +34,7 @@ class Tabletop(NamedTuple):
         return np.stack([self.centre - half, self.centre + half])
 
     def stand_in(self, spec: mujoco.MjSpec) -> str:
-        """Have it stand in the world of a model that is yet to be compiled.
+        """Stand it in the world of a model that is yet to be compiled.
 
         It collides with arms and what they hold.
 
