@@ -1,7 +1,6 @@
 """Who may stay connected: the client while it is there, and newcomers before those who wait."""
 
 import contextlib
-import itertools
 import os
 import select
 import signal
@@ -103,28 +102,24 @@ def test_a_host_with_many_connections_does_not_cost_another_its_own(server):
 
 @pytest.mark.parametrize("talk", [b"", HELLO[:9]], ids=["silent", "half a message"])
 def test_connections_that_prove_no_key_do_not_keep_out_a_client_that_has_it(start_server, talk):
+    """While it shakes hands, half as many come as must come for it to lose its place."""
     server = start_server(key=KEY)
-    done = threading.Event()
+    with contextlib.ExitStack() as strangers:
 
-    def occupy():
-        """Keep every place taken, and take a new one as soon as one is lost."""
-        with contextlib.ExitStack() as stack, contextlib.suppress(OSError):
-            for i in itertools.count():
-                if done.is_set():
-                    return
-                stranger = stack.enter_context(connected(server.address))
-                stranger.sendall(talk)
-                if i >= MAX_STRANGERS:
-                    time.sleep(0.01)
+        def come(n):
+            """Take places, all of which have been taken, so that others lose theirs."""
+            for _ in range(n):
+                with contextlib.suppress(OSError):
+                    strangers.enter_context(connected(server.address)).sendall(talk)
 
-    occupying = threading.Thread(target=occupy)
-    occupying.start()
-    try:
+        come(MAX_STRANGERS)
         for _ in range(20):
-            assert_serves(server, KEY)
-    finally:
-        done.set()
-        occupying.join()
+            newcomers = threading.Thread(target=come, args=(MAX_STRANGERS // 2,))
+            newcomers.start()
+            try:
+                assert_serves(server, KEY)
+            finally:
+                newcomers.join()
 
 
 # ---- a client that went away ---------------------------------------------------------------------
