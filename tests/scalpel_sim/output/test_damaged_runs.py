@@ -37,6 +37,8 @@ from tests.scalpel_sim.output.damaged_runs import (
 )
 from tests.scalpel_sim.output.killed_runs import Killed, expect_same, led, physics
 
+pytestmark = pytest.mark.end_to_end
+
 WRONG = "9.75"
 """A number that no row holds."""
 

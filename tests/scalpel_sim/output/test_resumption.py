@@ -33,6 +33,8 @@ from tests.scalpel_sim.output.killed_runs import (
 )
 from tissue import StateError
 
+pytestmark = pytest.mark.end_to_end
+
 SLAB = changed(SCENES["slab"], seconds=0.46)
 
 
