@@ -108,7 +108,7 @@ class Simulation:
         """Where a hand may lead the middle of the edge [m], tissue frame: the lowest and the
         highest place, shape (2, 3); None: the blade follows a script."""
         self.expected_force: float | None = None
-        """What the cut takes if the body does not give way [N]; None where that is not known."""
+        """Force of the cut if the body does not give way [N]; None where that is not known."""
         self.pictures: list[DrawFrame] = []
         """Called after each frame; most frames they skip."""
         self.wall_seconds = 0.0

@@ -283,7 +283,7 @@ def _edge(fraction: float) -> BladeSegment:
 
 
 _JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move, "cut": _incise_and_cut}
-"""What two processes do for a set. Each takes half of the time."""
+"""Jobs of two processes for a set. Each takes half of the time."""
 _EVERY_JOB = "all"
 """Name of all jobs, one after the other."""
 

@@ -24,7 +24,7 @@ SETS = (
     KernelSet(contact="impulses"),
     KernelSet(is_held=True),
 )
-"""What most tests of bodies and runs call. What one file alone calls, it compiles."""
+"""Kernels of most tests of bodies and runs. What one file alone calls, it compiles."""
 N_KERNELS = 1400
 """How many kernels these sets have, about."""
 

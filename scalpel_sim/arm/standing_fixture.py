@@ -12,7 +12,7 @@ from scalpel_sim.arm.free_names import free_prefix
 from tissue import FloatArray
 
 _PREFIX = "fixture_"
-"""What the name of its body begins with, where that is free; that of the fixture follows."""
+"""Prefix of the name of its body, where that is free; the name of the fixture follows."""
 
 _THICKNESS = 2e-4
 """Thickness of the plate that a triangle of a mesh is [m]: half that of a scalpel's blade."""

@@ -35,10 +35,10 @@ _log = logging.getLogger(__name__)
 
 
 class Resumption(NamedTuple):
-    """What is there of a run that was interrupted, as far as its checksums hold."""
+    """Files of a run that was interrupted, as far as their checksums hold."""
 
     plan: RunPlan | None
-    """What it was asked for; None: no note of it is whole."""
+    """Request of the run; None: no note of it is whole."""
     last: RunMark | None
     """How far it had got by the last note."""
     recorded: Recording
@@ -174,7 +174,7 @@ def _expect_recorded(folder: Path, last: RunMark) -> None:
 def _warn_of_rows(
     path: Path, marks: Sequence[RunMark], recorded: Recording, forces: FileSum
 ) -> None:
-    """Say that rows of `forces.csv` are done again which were written, if there are any."""
+    """Warn that rows of `forces.csv` are done again which were written, if there are any."""
     n_bytes = max((mark.written[FORCES].n_bytes for mark in marks), default=0)
     if path.exists():
         n_bytes = max(n_bytes, path.stat().st_size)

@@ -50,7 +50,7 @@ REPLAY_FRAMES = "replay.part"
 """The frames of the replay, while the run goes on."""
 
 JOURNAL = "journal.part"
-"""What the run notes of itself, while it goes on."""
+"""Notes of the run on itself, while it goes on."""
 
 PASSING_FILES = (*CHECKPOINT_FILES, REPLAY_FRAMES, JOURNAL)
 """Names of files that are there until a run is complete."""

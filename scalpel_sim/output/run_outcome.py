@@ -1,4 +1,4 @@
-"""What a run was asked for and what came of it: the figures that warnings are made from."""
+"""Request and outcome of a run: the figures that warnings are made from."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -40,9 +40,9 @@ class RunOutcome:
     frame: TissueFrame
     """Where the tissue lies in the world."""
     settings: dict[str, Any]
-    """What the command line and the scene resolved to; of a tissue elsewhere some are missing."""
+    """Settings from command line and scene; of a tissue elsewhere some are missing."""
     tissue: TissueDescription
-    """What is known of the tissue, wherever it is."""
+    """Description of the tissue, wherever it is."""
     first: Snapshot
     """The body before the first frame."""
     last: Snapshot
@@ -50,7 +50,7 @@ class RunOutcome:
     node_size: float
     """Mean size of a node [m]."""
     expected_force: float | None = None
-    """What the cut takes if the body does not give way [N]; None where that is not known."""
+    """Force of the cut if the body does not give way [N]; None where that is not known."""
     counters: dict[str, Any] = field(default_factory=dict)
     """Counters of the bridge."""
 

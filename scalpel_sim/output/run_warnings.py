@@ -46,7 +46,7 @@ class RunWarning(NamedTuple):
     kind: str
     """Its name, which stays."""
     message: str
-    """What is the matter, by how much, and why, in one line."""
+    """Problem, size and reason, in one line."""
     figures: dict[str, Any]
     """The numbers in it, by name. SI units; the names end in them."""
 

@@ -78,7 +78,7 @@ class Summary(NamedTuple):
     touched: dict[str, int]
     """In how many frames a part of the arm collided, by "PART, FIXTURE OR PART"."""
     warnings: list[dict[str, Any]]
-    """What the run was asked for and did not do: `kind`, `message`, and the figures of the kind."""
+    """Requests that the run did not fulfil: `kind`, `message`, and the figures of the kind."""
     settings: dict[str, Any]
     """The resolved settings of the run: material, stroke, arm."""
     versions: dict[str, str]
@@ -111,7 +111,7 @@ class RunFacts(NamedTuple):
     held_points: Sequence[int] = ()
     """Number of points that each attachment holds at the end."""
     warnings: Sequence[dict[str, Any]] = ()
-    """What is to be said of the run: see `scalpel_sim.output.run_warnings`."""
+    """Warnings of the run: see `scalpel_sim.output.run_warnings`."""
 
 
 def summarise(recording: Recording, facts: RunFacts) -> Summary:

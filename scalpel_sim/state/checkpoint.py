@@ -26,7 +26,7 @@ class CheckpointHead(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a checkpoint says beside the state."""
 
     plan: RunPlan
-    """What the run was asked for."""
+    """Request of the run."""
     mark: RunMark
     """How far it had got."""
 

@@ -1,4 +1,4 @@
-"""What a run notes of itself while it goes on, so that another process can go on with it."""
+"""Notes of a run on itself, from which another process can go on with it."""
 
 import zlib
 from pathlib import Path
@@ -15,7 +15,7 @@ _CRC = 8
 class RunPlan(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="note", tag="plan"
 ):
-    """What a run was asked for."""
+    """Request of a run."""
 
     dt: float
     """Simulated time of a frame [s]."""
@@ -24,7 +24,7 @@ class RunPlan(
     exports: list[str]
     """Files for the body's surface after the run."""
     settings: dict[str, Any]
-    """What the summary says of the settings."""
+    """Settings, as the summary has them."""
 
 
 class RunMark(
@@ -48,7 +48,7 @@ class RunMark(
 
 
 class Noted(NamedTuple):
-    """What a journal holds."""
+    """Content of a journal."""
 
     plan: RunPlan | None
     """The last plan; None: there is none whose checksum holds."""

@@ -10,13 +10,13 @@ from time import sleep
 import numpy as np
 import pytest
 
-from scalpel_sim.output.recording import WALL_TIMES, read_forces
+from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.summary import COMPLETE
 from tests.battery import battery
 from tests.processes import start
+from tests.scalpel_sim.output.killed_runs import figures, physics
 
 RUN = ("run", "slab", "--seconds", "0.6", "--quiet", "--out")
-WALL = ("wall_seconds", "real_time_factor", "frame_rate_median", "frame_rate_p99", "share")
 LONGEST_WAIT = 120.0
 """Time until which a run has begun [s]."""
 
@@ -26,16 +26,6 @@ def finish(*words):
     program = start(*words)
     out, errors = program.communicate(timeout=600.0)
     assert program.returncode == 0, (words, out, errors)
-
-
-def physics(folder):
-    recording = read_forces(folder / "forces.csv")
-    return recording.rows[:, [name not in WALL_TIMES for name in recording.columns]]
-
-
-def figures(folder):
-    summary = json.loads((folder / "summary.json").read_text())
-    return {key: value for key, value in summary.items() if key not in WALL}
 
 
 @pytest.fixture(scope="module")

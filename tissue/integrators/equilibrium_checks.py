@@ -21,7 +21,7 @@ _log = logging.getLogger("tissue")
 
 
 class SupportConditions(NamedTuple):
-    """What a body comes to rest on, and what it weighs."""
+    """Support of a body that comes to rest, and its weight."""
 
     floor: float | None
     """Height of the floor below it [m], or None."""

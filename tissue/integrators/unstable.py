@@ -3,7 +3,7 @@
 from tissue.types import TissueError
 
 REMEDY = "A shorter time step, or a material that is softer or heavier, may help"
-"""What to try."""
+"""Cases to try."""
 
 
 class UnstableError(TissueError):

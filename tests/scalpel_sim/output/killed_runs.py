@@ -24,7 +24,7 @@ WALL = ("wall_seconds", "real_time_factor", "frame_rate_median", "frame_rate_p99
 
 
 class Killed(BaseException):
-    """What ends a run at once, as a kill does."""
+    """End of a run at once, as by a kill."""
 
 
 def at(n_frames):

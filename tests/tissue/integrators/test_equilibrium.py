@@ -196,7 +196,7 @@ def test_a_body_too_soft_for_its_weight_is_told_so_and_not_that_nothing_holds_it
 
 
 def test_supports_that_are_everywhere_carry_any_weight():
-    """What counts is the distance to a support, not the size of the body."""
+    """The distance to a support counts, not the size of the body."""
     fixed = np.ones(len(CUBE.positions), bool)
     fixed[np.flatnonzero(~fixed_nodes(CUBE, "left,right,front,back,bottom,top"))[0]] = False
     tissue = Tissue(CUBE, Material(young_modulus=3.0, toughness=1e-4), fixed=fixed)
