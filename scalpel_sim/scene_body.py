@@ -73,7 +73,6 @@ def make_tissue(scene: Scene) -> Tissue:
             cut=scene.cut,
             scheme=scene.scheme,
             relaxation=scene.relaxation,
-            contact=scene.contact,
             threads=scene.threads,
             audit=scene.audit,
             mass_scaling=scene.mass_scaling or None,

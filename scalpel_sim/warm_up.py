@@ -67,7 +67,6 @@ class KernelSet(NamedTuple):
     has_sides: bool = True
     """Whether the blade has a thickness."""
     precision: str = "single"
-    contact: str | None = None
     relaxes: bool = False
     """Whether the stress of the material relaxes."""
     is_held: bool = False
@@ -80,7 +79,7 @@ class KernelSet(NamedTuple):
         """Return the set that a scene needs."""
         has_sides = scene.blade is not None
         law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
-        how = (scene.audit, has_sides, scene.precision, scene.contact)
+        how = (scene.audit, has_sides, scene.precision)
         relaxes = bool(scene.material.prony)
         is_held = bool(scene.attachments) or any(
             grasper.holds == "attachment" for grasper in scene.graspers
@@ -99,7 +98,6 @@ class KernelSet(NamedTuple):
             scheme=self.scheme,
             relaxation=self.relaxation,
             precision=self.precision,
-            contact=self.contact,
             audit=self.audit,
         )
 

@@ -16,12 +16,10 @@ SETS = (
     DOUBLE,
     DOUBLE._replace(relaxation="verlet"),
     DOUBLE._replace(law="springs"),
-    DOUBLE._replace(contact="impulses"),
     SPRINGS,
     SPRINGS._replace(relaxation="hierarchical"),
     DOUBLE._replace(law="springs", relaxation="hierarchical"),
     SPRINGS._replace(relaxation="hierarchical", scheme="paper", has_sides=False),
-    KernelSet(contact="impulses"),
     KernelSet(is_held=True),
 )
 """Kernels of most tests of bodies and runs. What one file alone calls, it compiles."""

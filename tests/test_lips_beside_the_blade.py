@@ -7,20 +7,16 @@ import pytest
 
 from scalpel_sim.scene_parts.scene import GEL
 from tests import bodies, strokes
+from tests.overlaps import ELEMENT, NO_GRAVITY, overlap_depths
 from tests.test_conservation import momentum
-from tests.test_contact import ELEMENT, NO_GRAVITY, overlap_depths
 from tissue import BladeSweep, FloatArray, Material, SolverSettings, TetrahedralMesh, Tissue, block
 
-CONTACTS = ["penalty", "impulses"]
 
-
-@pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize("settles", [False, True])
-def test_a_floor_far_below_changes_no_bit_of_a_cut(contact, settles):
+def test_a_floor_far_below_changes_no_bit_of_a_cut(settles):
     def run(floor: float | None) -> tuple[FloatArray, FloatArray]:
         mesh = block((3, 3, 3), (0.03,) * 3)
-        solver = SolverSettings(contact=contact)
-        tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), floor=floor, solver=solver)
+        tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), floor=floor)
         if settles:
             tissue.settle()
         results = strokes.make(tissue, strokes.straight(mesh))
@@ -31,13 +27,11 @@ def test_a_floor_far_below_changes_no_bit_of_a_cut(contact, settles):
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("contact", CONTACTS)
-def test_lips_of_a_squeezed_block_overlap_no_more_with_the_blade_between_them_than_later(contact):
+def test_lips_of_a_squeezed_block_overlap_no_more_with_the_blade_between_them_than_later():
     """Contact as forces leaves 10 to 40 um in the median; without contact it is up to 1.4 mm."""
     at, mesh = 0.37, block((4, 4, 4), (0.04,) * 3)
     squeezed = mesh.positions * (0.9, 1.0, 1.0)
-    solver = SolverSettings(contact=contact)
-    tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), positions=squeezed, solver=solver)
+    tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), positions=squeezed)
     tissue.settle()
     moved = TetrahedralMesh(tissue.snapshot().positions, mesh.tetrahedra)
     meanwhile, later = [], []

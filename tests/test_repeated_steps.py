@@ -25,9 +25,9 @@ BALL = np.array([*MESH.positions.mean(axis=0)[:2], TOP[2] + 0.0101])
 SOLID = Material(law="neo_hookean", poisson_ratio=0.45)
 
 
-def in_mid_cut(relaxation="global", contact="penalty", material=SOLID):
+def in_mid_cut(relaxation="global", material=SOLID):
     """Return a body that a blade is cutting."""
-    solver = SolverSettings(relaxation=relaxation, contact=contact, audit=True)
+    solver = SolverSettings(relaxation=relaxation, audit=True)
     tissue = Tissue(MESH, material, fixed=bodies.sides(MESH), blade=BladeShape(), solver=solver)
     for sweep in STROKE[:MIDDLE]:
         tissue.step(sweep, strokes.DT)

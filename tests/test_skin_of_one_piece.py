@@ -52,10 +52,3 @@ def test_edges_of_one_piece_are_not_tested_against_each_other():
     contact = tissue._system.contact
     assert contact.forces.n_pressing > 5
     assert contact._search.ridge_pairs.n_pairs == 0
-
-
-def test_with_contact_by_impulses_skin_of_one_piece_goes_through_itself():
-    """A limit: docs/contact.md names it."""
-    tissue, lowest = fallen(0.012, SolverSettings(contact="impulses"))
-    assert not tissue._system.contact.is_touching
-    assert lowest < -0.01

@@ -93,7 +93,6 @@ CASES = {
     "two threads": Case(SolverSettings(threads=2)),
     "verlet": Case(SolverSettings(relaxation="verlet", audit=True)),
     "hierarchical": Case(SolverSettings(relaxation="hierarchical"), SPRINGS),
-    "impulses": Case(SolverSettings(contact="impulses")),
     "floor": Case(floor=float(MESH.positions[:, 2].min())),
     "springs": Case(material=SPRINGS),
     "stiffening": Case(material=Material(law="exponential", stiffening=5.0)),

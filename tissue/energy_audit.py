@@ -47,8 +47,6 @@ class _Amounts(NamedTuple):
     """Energy that breaking the skin took."""
     friction: float
     """Energy that friction on the blade took."""
-    contact: float
-    """Energy that contact took which corrects motion."""
     mass: float
     """Energy that nodes lost when they got mass."""
     released: float
@@ -82,7 +80,7 @@ def _write_amounts(
         edge: The cutting edge over a time step.
         when: Instant of it, as a fraction.
         is_known: Whether the energies of the body itself, the first three, are known.
-        out: Written, shape (16,).
+        out: Written, shape (15,).
     """
     body, elastic, blade = context.body, context.elastic, context.blade
     if not is_known:
@@ -95,8 +93,7 @@ def _write_amounts(
     out[7], out[8] = totals.work_of_blade, context.supports.work
     out[9], out[10] = context.damping.dissipated, totals.work_of_cutting
     out[11], out[12] = totals.work_of_breaking, totals.work_of_friction
-    out[13], out[14] = context.contact_loss.dissipated, elastic.scaling.lost
-    out[15] = totals.released
+    out[13], out[14] = elastic.scaling.lost, totals.released
 
 
 def _attached(system: System) -> float:
@@ -110,8 +107,7 @@ def _attached(system: System) -> float:
 class Audit:
     """The account of one body, or none.
 
-    It costs a sum over the body in each step, two more in each cut that changes the mesh, and two
-    in each substep in which parts of the body touch.
+    It costs a sum over the body in each step, and two more in each cut that changes the mesh.
 
     Args:
         is_kept: Whether an account is kept; if not, the methods do nothing.
@@ -124,6 +120,8 @@ class Audit:
         self._before_cut = self.changes
         self.work_of_loads = 0.0
         """Work of loads, and of what moves attachments, since the account began [J]."""
+        self.lost_at_geoms = 0.0
+        """Energy lost in contacts with rigid geoms since the account began [J]."""
         self._attached_at_first = 0.0
         self._is_known = False
         self._numbers = np.zeros(len(_Amounts._fields))
@@ -134,8 +132,8 @@ class Audit:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
         if not self._is_kept:
             return
-        system.contact_loss.is_counted = 1
-        system.damping.dissipated = system.contact_loss.dissipated = 0.0
+        system.damping.is_counted = 1
+        system.damping.dissipated = self.lost_at_geoms = 0.0
         self.changes = MeshChanges()
         clear_works(system.interaction.state.totals)
         system.supports.work = self.work_of_loads = 0.0
@@ -184,7 +182,7 @@ class Audit:
             cutting=now.cutting,
             breaking=now.breaking + attachments.severing,
             friction=now.friction,
-            contact=now.contact + lost_in_contacts,
+            contact=self.lost_at_geoms + lost_in_contacts,
             topology=now.mass - sum(self.changes),
             released=now.released + attachments.released,
         )

@@ -14,7 +14,13 @@ from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.three_vectors import BladeSweep
 from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme
-from tissue.integrators.options import Global, IntegratorOptions, Verlet, checked_relaxation
+from tissue.integrators.options import (
+    Global,
+    Hierarchical,
+    IntegratorOptions,
+    Verlet,
+    checked_relaxation,
+)
 from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 from tissue.solver_settings import PRECISIONS, SolverSettings
 
@@ -24,8 +30,6 @@ toughness times depth. Springs were 2 to 9 % high at 0.8 and 57 % at 1.5, where 
 60 % of what it opened. Tetrahedra were within 3 % at 2.3, but there the force of the first
 centimetres dropped to 58 %. Laws that stiffen have no such limit."""
 
-_CONTACTS = ("impulses", "penalty")
-"""Names that `SolverSettings.contact` may have."""
 
 _log = logging.getLogger("tissue")
 
@@ -192,14 +196,25 @@ def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatAr
     return rows, ways / np.linalg.norm(ways, axis=1)[:, None]
 
 
-def checked_floor(floor: float | None, lowest: float) -> None:
-    """Refuse a floor that is no height, or that the body, whose lowest node is there, is under.
+def checked_floor(floor: float | None, lowest: float, options: IntegratorOptions) -> None:
+    """Refuse a floor that is no height, that the body is below, or that nothing can touch.
+
+    Args:
+        floor: Height of the floor [m]; None for no floor.
+        lowest: Height of the lowest node of the body [m].
+        options: The integrator.
 
     Raises:
-        ValueError: it is not finite, or not below the body.
+        ValueError: it is not finite, or not below the body, or the relaxation is `hierarchical`,
+            which has no contact.
     """
     if floor is None:
         return
+    if isinstance(options, Hierarchical):
+        raise ValueError(
+            "relaxation='hierarchical' is the paper's, without contact: the body would fall "
+            "through the floor. Use 'global' or 'verlet', or omit the floor"
+        )
     if not np.isfinite(floor):
         raise ValueError(f"floor is {floor} m; it must be a finite height, or None for no floor")
     if floor > lowest:
@@ -232,25 +247,6 @@ def checked_time_step(dt: float) -> float:
     if not (math.isfinite(dt) and dt >= 0.0):
         raise ValueError(f"dt is {dt} s; it must be finite and not negative")
     return float(dt)
-
-
-def checked_contact(name: str | None, options: IntegratorOptions) -> str:
-    """Return the contact that was chosen, or the one that goes with an integrator.
-
-    Raises:
-        ValueError: there is no such contact, or it does not go with the integrator.
-    """
-    moves_all = isinstance(options, Global | Verlet)
-    if name is None:
-        return "penalty" if moves_all else "impulses"
-    if name not in _CONTACTS:
-        raise ValueError(f"no contact is called {name!r}. Known: {', '.join(_CONTACTS)}")
-    if name == "penalty" and not moves_all:
-        raise ValueError(
-            "contact='penalty' needs relaxation='global' or 'verlet': the others correct the "
-            "motion after each substep. Omit one of the two"
-        )
-    return name
 
 
 def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOptions:

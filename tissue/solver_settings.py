@@ -40,11 +40,6 @@ class SolverSettings:
     precision: str = "double"
     """Precision in which the forces of tetrahedra are computed: `double`, or `single`, which takes
     two thirds of the time. Positions and velocities are double either way."""
-    contact: str | None = None
-    """How the body is kept from passing through itself and the floor: `penalty`, springs between
-    contacts that are found once in a time step, with the relaxation `global` or `verlet`; or
-    `impulses`, which correct its motion after each substep. None: `penalty` where the relaxation
-    lets it."""
     threads: int = 1
     """How many threads share the loops over the body. The result is the same to the last bit;
     with the relaxation `global` or `verlet`. More than one pays only where no other program needs

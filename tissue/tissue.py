@@ -22,7 +22,6 @@ from tissue.cutting.snapping import EXPLAINED
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.energy_audit import Audit
 from tissue.input_checks import (
-    checked_contact,
     checked_edges,
     checked_fixed,
     checked_floor,
@@ -118,14 +117,13 @@ class Tissue(RepeatedSteps):
             body = with_room_to_hang(body)
         method = method_of(options, self.material.law)
         single = solver.precision == "single"
-        contact = checked_contact(solver.contact, options)
         together = not isinstance(options, Hierarchical)
-        how = Numerics(contact, solver.mass_scaling, method.damps_between_steps, single, together)
+        how = Numerics(solver.mass_scaling, method.damps_between_steps, single, together)
         self._system = assembled(body, self.material, surroundings, blade, floor, how)
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
-        checked_floor(floor, float(self.bounds[0, 2]))
+        checked_floor(floor, float(self.bounds[0, 2]), options)
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
         self._incision = Incision(scheme, self.node_size)
         self._system.find_loose_pieces()
@@ -288,6 +286,7 @@ class Tissue(RepeatedSteps):
         before = self._begin_driving(increment, has_blade)
         n = self._integrator.relax(system, self._blade_context, increment, has_blade)
         self._audit.work_of_loads += self._driven_work(before, increment)
+        self._audit.lost_at_geoms += system.geoms.arrays.dissipated
         if n > 0:
             self._audit.forget()
         self._edge_now = (increment.edge, increment.end)

@@ -148,10 +148,6 @@ class SolverOptions:
     precision: str | None = None
     """Precision of the forces of tetrahedra: single [default], or double, which takes a third
     longer. Positions and velocities are double."""
-    contact: str | None = None
-    """How the body is kept from passing through itself: penalty, springs, found once a frame
-    [default, with the relaxation global or verlet]; or impulses, which correct its motion in each
-    substep."""
     threads: int | None = None
     """Threads that share the loops over the body, to the same bits, with the relaxation global or
     verlet; give it no more than there are idle cores [default: 1]."""

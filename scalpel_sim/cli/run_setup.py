@@ -48,7 +48,6 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "relaxation",
         "mass_scaling",
         "precision",
-        "contact",
         "threads",
         "blade",
         "audit",

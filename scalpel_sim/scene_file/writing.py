@@ -71,7 +71,6 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
                 "relaxation": scene.relaxation,
                 "mass_scaling": scene.mass_scaling,
                 "precision": scene.precision,
-                "contact": scene.contact,
                 "threads": scene.threads,
                 "snap": scene.cut.snap,
                 "snap_floor": scene.cut.floor,

@@ -13,8 +13,6 @@ RELAXATIONS = ("global", "verlet", "hierarchical")
 _PRECISIONS = ("single", "double")
 """Precisions that `Tissue` takes."""
 
-CONTACTS = ("impulses", "penalty")
-"""Names of the contacts that `Tissue` takes."""
 
 COUPLINGS = ("rigid", "virtual")
 """Names of the couplings between the arm's blade and the one that cuts."""
@@ -60,18 +58,6 @@ def check_precision(name: str) -> None:
     """
     if name not in _PRECISIONS:
         raise unknown("precision", name, _PRECISIONS)
-
-
-def check_contact(name: str | None, relaxation: str) -> None:
-    """Check that a contact exists, if one was chosen, and that it goes with the relaxation.
-
-    Raises:
-        UsageError: it does not; the message says why.
-    """
-    if name is not None and name not in CONTACTS:
-        raise unknown("contact", name, CONTACTS)
-    if name == "penalty" and relaxation not in ("global", "verlet"):
-        raise UsageError(f"--contact penalty needs --relaxation global or verlet, not {relaxation}")
 
 
 def can_audit(relaxation: str) -> bool:

@@ -15,7 +15,6 @@ from scalpel_sim.scene_parts.choices import (
     ARM_CHOICES,
     COUPLINGS,
     can_audit,
-    check_contact,
     check_precision,
     check_relaxation,
     check_scheme,
@@ -78,9 +77,6 @@ class Scene:
     precision: str = "single"
     """Precision of the forces of tetrahedra: `single` or `double`. Positions and velocities are
     double."""
-    contact: str | None = None
-    """How the body is kept from passing through itself: `impulses`, or `penalty`; None: `penalty`
-    with the relaxation global or verlet."""
     threads: int = 1
     """Threads that share the loops over the body, with the relaxation global or verlet."""
     stretch: float = 0.05
@@ -134,7 +130,6 @@ class Scene:
         """
         check_scheme(self.scheme)
         check_relaxation(self.relaxation, self.threads)
-        check_contact(self.contact, self.relaxation)
         if self.audit and not can_audit(self.relaxation):
             raise UsageError(
                 f"--audit needs --relaxation global or verlet, not {self.relaxation}; omit "

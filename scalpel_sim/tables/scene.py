@@ -80,7 +80,6 @@ class SolverTable(TomlTable, kw_only=True, frozen=True):
     relaxation: Text | None = None
     mass_scaling: NotNegative | None = None
     precision: Text | None = None
-    contact: Text | None = None
     threads: Whole | None = None
     snap: Share | None = None
     snap_floor: Share | None = None

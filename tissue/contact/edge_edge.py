@@ -1,9 +1,9 @@
-"""Whether two edges of the skin went through each other during a step."""
+"""Geometry of two edges of the skin: their distance, and where their lines are closest."""
 
 from typing import NamedTuple
 
-from tissue.core.jit import inlined, kernel
-from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
 _NEARLY_PARALLEL = 1e-3
 """Sine of the angle between edges below which they count as parallel and have no crossing. Their
@@ -16,18 +16,6 @@ SAME_SIDE = 0.5
 """Cosine between the normals of two edges above which they cannot face each other. Contact needs
 a direction within a right angle of one normal and of the other's opposite: between edges of one lip
 that is one along the lip."""
-
-
-class EdgeEdge(NamedTuple):
-    """Two edges that went through each other, seen at the end of the step."""
-
-    is_through: bool
-    normal: Vec3
-    """Unit vector from the second to the first, as they should lie."""
-    s: float
-    """Where along the first edge, as a fraction."""
-    t: float
-    """Where along the second edge, as a fraction."""
 
 
 class Edges(NamedTuple):
@@ -70,66 +58,12 @@ def crossing_of(at: Edges) -> Crossing:
     return Crossing(True, scale(1.0 / length, n), -dot(w, n) / length, s, t)
 
 
-@inlined
-def lines_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
-    """Whether the lines ab and cd face each other and overlap: the cheapest test, done first.
-
-    By signs alone: cross(ab, cd) points along one edge's normal and against the other's, and along
-    it the edges lie in the wrong order. No branches, for none could be predicted.
-
-    Args:
-        at: The edges at the end of the step.
-        outward: Normal out of the body at ab; any length.
-        other_outward: Normal out of the body at cd; any length.
-    """
-    normal = cross(sub(at.b, at.a), sub(at.d, at.c))
-    towards = dot(normal, outward)
-    away = dot(normal, other_outward)
-    apart = dot(normal, sub(at.a, at.c))
-    return ((away > 0.0) & (towards < 0.0) & (apart < 0.0)) | (
-        (away < 0.0) & (towards > 0.0) & (apart > 0.0)
-    )
-
-
 @kernel
 def face_the_same_side(outward: Vec3, other_outward: Vec3) -> bool:
     """Whether the normals of two edges show that they cannot face each other, see `SAME_SIDE`."""
     same = dot(outward, other_outward)
     squares = dot(outward, outward) * dot(other_outward, other_outward)
     return same > 0.0 and same * same > SAME_SIDE * SAME_SIDE * squares
-
-
-@kernel
-def edge_edge(
-    t0: Edges, t1: Edges, outward: Vec3, other_outward: Vec3, residual: float, tolerance: float
-) -> EdgeEdge:
-    """Test whether ab went through cd, from outside to inside, between t0 and t1.
-
-    They did if they now overlap and did not before, at the same places and along the same normal.
-    What overlapped then has always done so: two edges of one body on either side of it.
-
-    Args:
-        t0: Edges before the step.
-        t1: Edges after the step.
-        outward: Normal out of the body at ab; any length.
-        other_outward: Normal out of the body at cd; any length.
-        residual: How deep they may have been at t0 [m]: where they could not be pushed apart.
-        tolerance: Depth that counts as none [m].
-    """
-    outside = EdgeEdge(False, outward, 0.0, 0.0)
-    if not lines_overlap(t1, outward, other_outward):
-        return outside
-    now = crossing_of(t1)
-    sign = 1.0 if dot(now.normal, other_outward) > 0.0 else -1.0
-    if not (now.is_one and is_inner(now.s) and is_inner(now.t)):
-        return outside
-    depth = -sign * now.gap
-    if not depth > tolerance:
-        return outside
-    normal = scale(sign, now.normal)
-    if not dot(normal, separation(t0, now.s, now.t)) >= -residual:
-        return outside
-    return EdgeEdge(True, normal, now.s, now.t)
 
 
 @kernel
@@ -142,3 +76,25 @@ def separation(at: Edges, s: float, t: float) -> Vec3:
 def is_inner(s: float) -> bool:
     """Whether a place along an edge is not at its ends."""
     return EDGE_END <= s <= 1.0 - EDGE_END
+
+
+@kernel
+def distance_of_edges(at: Edges) -> float:
+    """Return the distance of the segments ab and cd [m]."""
+    u, v, r = sub(at.b, at.a), sub(at.d, at.c), sub(at.a, at.c)
+    uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
+    ur, vr = dot(u, r), dot(v, r)
+    square = uu * vv - uv * uv
+    s = 0.0
+    if square > 0.0:
+        s = min(max((uv * vr - ur * vv) / square, 0.0), 1.0)
+    along = uv * s + vr
+    if along <= 0.0 or vv == 0.0:
+        t = 0.0
+        s = min(max(-ur / uu, 0.0), 1.0) if uu > 0.0 else 0.0
+    elif along >= vv:
+        t = 1.0
+        s = min(max((uv - ur) / uu, 0.0), 1.0) if uu > 0.0 else 0.0
+    else:
+        t = along / vv
+    return norm(axpy(-t, v, axpy(s, u, r)))

@@ -1,11 +1,13 @@
 """Normals at the nodes of faces, and which nodes belong to inverted tetrahedra."""
 
 from tissue.contact.faces import NO_FACE, Faces
-from tissue.contact.pairs import Nodes
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, store, sub, vec3
 from tissue.mesh.body import Body
+
+Nodes = tuple[int, int, int, int]
+"""A node and the corners of a triangle, or the ends of two edges."""
 
 
 @kernel

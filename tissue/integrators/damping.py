@@ -50,6 +50,8 @@ class Damping(Arrays):
     dissipated: FloatCell
     """Energy lost in viscosity and drag so far [J]; where damping acts in every stage it is counted
     for an account of energy alone."""
+    is_counted: IntCell
+    """1 where an account of energy is kept, else 0."""
     rate_uncut: float
     """Highest rate at which damping stops a motion of the body before it is cut [1/s]."""
     retardation_time: float

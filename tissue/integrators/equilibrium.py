@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.blade.edge import Edge
-from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.equilibrium_checks import SupportConditions, fastest_node, gone_too_far
@@ -42,12 +41,8 @@ STEPS_BETWEEN_LOOKS = 4
 """Steps between two evaluations of the forces, from which the damping follows. It acts after each
 step: after each fourth it would meet what turns round meanwhile always at one phase, and at that
 without velocity the motion would never end."""
-STEPS_TO_STAY = 1000
-"""Steps in which a body with contact by impulses may hardly move to count as settled. Such contact
-lets what it holds sink in, and puts it back in each step: no acceleration tells that it rests."""
-STAY = 1e-3
-"""How far a node of it may move in that time, per mean node size: 7 um in a cube of 4 cm on a
-floor, whose nodes go to and fro by 1 to 3 um."""
+STEPS_BETWEEN_CHECKS = 1000
+"""Steps between two checks that no part of the body falls away."""
 DISTURBANCE = 1e-3
 """How far a node is moved so that it leaves an equilibrium that is not stable, per mean node size:
 in one where disturbances grow at 20 /s it is then accelerated by more than `SETTLED`."""
@@ -206,7 +201,7 @@ class _Watch:
 
     def __init__(self, system: System, support: SupportConditions) -> None:
         self._system, self._support = system, support
-        self._begin = self._kept = self._positions.copy()
+        self._begin = self._positions.copy()
         self._farthest = FARTHEST_HELD * float(np.linalg.norm(np.ptp(self._begin, axis=0)))
         self._n_quiet = 0
 
@@ -223,11 +218,8 @@ class _Watch:
         largest = float(np.abs(look.accelerations).max())
         if not math.isfinite(largest):
             raise not_finite()
-        if taken % STEPS_TO_STAY == 0:
+        if taken % STEPS_BETWEEN_CHECKS == 0:
             self._expect_near()
-        contact = self._system.contact
-        if contact.is_touching and isinstance(contact, SelfContact):
-            return taken % STEPS_TO_STAY == 0 and self._has_stayed()
         is_rounding = largest < self._rounding(look.frequency_squared)
         self._n_quiet = self._n_quiet + 1 if is_rounding else 0
         return largest < SETTLED or self._n_quiet == QUIET
@@ -246,12 +238,6 @@ class _Watch:
             return 0.0
         moved = float(np.abs(self._positions - system.body.rest[: system.body.n_nodes]).max())
         return ROUNDING * moved * frequency_squared
-
-    def _has_stayed(self) -> bool:
-        """Return whether all nodes are near where they were when this was asked last."""
-        moved = float(np.abs(self._positions - self._kept).max())
-        self._kept = self._positions.copy()
-        return moved <= STAY * self._system.node_size
 
     def _expect_near(self) -> None:
         """Refuse a body of which a part is far away.

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tissue.blade.blade_context import BladeContext
-from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
@@ -21,7 +20,6 @@ from tissue.integrators.relaxation import (
 )
 from tissue.integrators.rest import TIME_TO_REST
 from tissue.integrators.stability import NYSTROEM, STAGE_DAMPED, VERLET
-from tissue.integrators.staged_relaxation import relax_in_stages
 from tissue.integrators.step_choice import (
     StepChoice,
     begin_increment,
@@ -32,11 +30,8 @@ from tissue.integrators.step_choice import (
 from tissue.integrators.step_context import Increment
 from tissue.integrators.substeps import (
     nystroem_steps,
-    nystroem_steps_with_forces,
     runge_kutta_steps,
-    runge_kutta_steps_with_forces,
     verlet_steps,
-    verlet_steps_with_forces,
 )
 from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
@@ -50,12 +45,10 @@ _ROOM = SameTypes(room_for_contact)
 class Method(NamedTuple):
     """A method that advances all nodes together."""
 
-    take_steps: Callable[..., int]
+    take_steps: Callable[..., None]
     """Takes a number of steps, as `tissue.integrators.substeps.runge_kutta_steps`."""
-    take_steps_with_forces: Callable[..., None]
-    """The same where contact acts as forces: `runge_kutta_steps_with_forces`."""
     relax: Callable[..., int]
-    """A whole increment then: `tissue.integrators.relaxation.relax_by_runge_kutta`."""
+    """A whole increment: `tissue.integrators.relaxation.relax_by_runge_kutta`."""
     limit: int
     """What limits its steps: a constant of `tissue.integrators.stability`."""
     damps_between_steps: bool
@@ -68,13 +61,11 @@ def method_of(options: IntegratorOptions, law: Law) -> Method:
     These move all nodes where a body settles.
     """
     if isinstance(options, Verlet):
-        return Method(verlet_steps, verlet_steps_with_forces, relax_by_verlet, VERLET, True)
+        return Method(verlet_steps, relax_by_verlet, VERLET, True)
     usual = "stage" if law == "springs" else "step"
     if isinstance(options, Global) and (options.damping or usual) == "step":
-        steps = (nystroem_steps, nystroem_steps_with_forces, relax_by_nystroem)
-        return Method(*steps, NYSTROEM, True)
-    steps = (runge_kutta_steps, runge_kutta_steps_with_forces, relax_by_runge_kutta)
-    return Method(*steps, STAGE_DAMPED, False)
+        return Method(nystroem_steps, relax_by_nystroem, NYSTROEM, True)
+    return Method(runge_kutta_steps, relax_by_runge_kutta, STAGE_DAMPED, False)
 
 
 class GlobalStepper:
@@ -115,8 +106,6 @@ class GlobalStepper:
     ) -> int:
         """Relax by an increment; return the steps taken. See `Integrator.relax`."""
         contact = system.contact
-        if isinstance(contact, SelfContact):
-            return relax_in_stages(self, system, blade, increment, has_blade)
         edge, dt, begin, end = increment
         choice = self._choice_for(system)
         if increment.span > 0.0 and not choice.is_at_rest and contact.wakes(system.body):
@@ -154,15 +143,7 @@ class GlobalStepper:
         """Advance the motion by an increment in `n` steps."""
         if self._threads is not None:
             self._threads.join(system.context)
-        contact, done = system.contact, 0
-        if not isinstance(contact, SelfContact):
-            self.method.take_steps_with_forces(system.context, *increment, n)
-            return
-        while True:
-            done = self.method.take_steps(system.context, contact.arrays, *increment, done, n)
-            if done == n:
-                return
-            contact.make_room()
+        self.method.take_steps(system.context, *increment, n)
 
     def _find_contacts(
         self, system: System, increment: Increment, choice: StepChoice
@@ -219,12 +200,8 @@ class GlobalStepper:
             self._choice.calm, self._choice.is_at_rest = 0.0, 0
 
     def let_rest(self, system: System) -> None:
-        """Move a body that has settled only once something acts on it.
-
-        With contact by impulses it is always moved: nothing tells when such a contact begins.
-        """
-        if not isinstance(system.contact, SelfContact):
-            self._choice_for(system).calm = TIME_TO_REST
+        """Move a body that has settled only once something acts on it."""
+        self._choice_for(system).calm = TIME_TO_REST
 
     def body_moved(self, body: Body) -> None:
         """Forget the bound on the strained body: it is another one now."""

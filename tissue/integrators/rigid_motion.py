@@ -127,5 +127,5 @@ def return_rigid_motion(context: StepContext, h: float) -> None:
         given -= 0.5 * h * weight * fallen
         after = vec3(body.velocities, i)
         given += 0.5 * body.masses[i] * (dot(after, after) - dot(before, before))
-    if context.contact_loss.is_counted == 1:
+    if context.damping.is_counted == 1:
         damping.dissipated -= given

@@ -15,7 +15,7 @@ def counts_stage_damping(context: StepContext) -> bool:
     """Return whether stages are damped, and the loss is to be counted."""
     around = context.surroundings
     is_damped = around.retardation_time > 0.0 or around.drag > 0.0
-    return is_damped and context.contact_loss.is_counted == 1
+    return is_damped and context.damping.is_counted == 1
 
 
 @kernel

@@ -11,7 +11,6 @@ from tissue.core.thread_team import Team
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.integrators.attachments import Attachments
 from tissue.integrators.damping import Damping
-from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stages import Stages
 from tissue.integrators.support_state import Supports
 from tissue.mesh.body import Body
@@ -29,15 +28,13 @@ class StepContext(Arrays, two_precisions=True):
     blade: BladeState
     """The blade: it acts in every stage, and slips after every step."""
     contacts: PenaltyForces
-    """Contacts that act as forces; none where contact corrects the motion after every step."""
+    """Contacts of the body with itself and the floor, as forces."""
     geoms: GeomContacts
     """Contacts with rigid geoms: forces in every stage, which are corrected after every step."""
     surroundings: Surroundings
     """Gravity, and the damping that acts in every stage."""
     damping: Damping
     """The damping that acts between steps."""
-    contact_loss: ContactLoss
-    """What contact takes from the energy, where that is counted."""
     supports: Supports
     """Whether fixed nodes move, and their work."""
     attachments: Attachments

@@ -22,7 +22,7 @@ def relax_stress(context: StepContext, seconds: float) -> None:
     What Maxwell elements dissipate is counted with the damping where an account is kept.
     """
     solid = context.elastic.solid
-    is_counted = context.contact_loss.is_counted == 1
+    is_counted = context.damping.is_counted == 1
     blocks = n_blocks(solid, context.body.n_tetrahedra)
     prepare_relaxation(solid, seconds)
     run_loop(context, DISPLACEMENTS, 0.0)

@@ -1,16 +1,12 @@
 """Steps of the integrators of all nodes, each with its damping, its contact and its slip."""
 
 from tissue.blade.edge import Edge
-from tissue.blade.forces import apply_slip, edge_energy
+from tissue.blade.forces import apply_slip
 from tissue.contact.geoms.contact_impulses import clear_geom_forces
 from tissue.contact.geoms.kinematic_contact import end_geom_substep
 from tissue.contact.penalty.contact_work import end_contact_substep
-from tissue.contact.resolve import note_all_positions, resolve
-from tissue.contact.state import ContactState
 from tissue.core.jit import kernel
-from tissue.core.simd import point, store_point
 from tissue.elasticity.collapse import clear_collapse_forces
-from tissue.elasticity.energy import body_energy
 from tissue.integrators.attachments import clear_attachment_forces
 from tissue.integrators.damping import change_velocities
 from tissue.integrators.nystroem import three_stage_nystroem
@@ -26,129 +22,17 @@ from tissue.integrators.stage_damping import (
     counts_stage_damping,
     end_damped_step,
 )
-from tissue.integrators.stages import Stages
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.strands import slip_strands
 from tissue.integrators.supports import add_support_damping
 from tissue.integrators.verlet import position_verlet
-from tissue.mesh.body import Body
 
 
 @kernel
 def runge_kutta_steps(
-    context: StepContext,
-    contact: ContactState,
-    edge: Edge,
-    dt: float,
-    begin: float,
-    end: float,
-    first: int,
-    n: int,
-) -> int:
-    """Take Runge-Kutta steps, each with its contact and its slip of the blade; return how many.
-
-    Fewer than `n` means that contact needs room: give it some, and go on from the step returned.
-
-    Args:
-        context: What takes part.
-        contact: What may touch; positions and velocities are corrected after every step.
-        edge: The cutting edge over the time step.
-        dt: Length of the time step [s].
-        begin: Fraction of the time step at which to begin.
-        end: Fraction of the time step at which to end.
-        first: Step to begin with: 0, or where it stopped for want of room.
-        n: Number of steps from `begin` to `end`.
-    """
-    share = (end - begin) / n
-    for i in range(first, n):
-        at = begin + i * share
-        if contact.is_pending == 0:
-            if contact.is_awake == 1:
-                note_all_positions(contact, context.body)
-            damp_if_due(context, i, n, share * dt)
-            _runge_kutta_step(context, edge, dt, at, share)
-        if not end_substep(context, contact, edge, dt, share, at + share):
-            return i
-    return n
-
-
-@kernel
-def nystroem_steps(
-    context: StepContext,
-    contact: ContactState,
-    edge: Edge,
-    dt: float,
-    begin: float,
-    end: float,
-    first: int,
-    n: int,
-) -> int:
-    """Take steps of the Nystroem method of three stages; see `runge_kutta_steps`.
-
-    Args:
-        context: What takes part.
-        contact: What may touch; positions and velocities are corrected after every step.
-        edge: The cutting edge over the time step.
-        dt: Length of the time step [s].
-        begin: Fraction of the time step at which to begin.
-        end: Fraction of the time step at which to end.
-        first: Step to begin with: 0, or where it stopped for want of room.
-        n: Number of steps from `begin` to `end`.
-    """
-    share = (end - begin) / n
-    for i in range(first, n):
-        at = begin + i * share
-        if contact.is_pending == 0:
-            if contact.is_awake == 1:
-                note_all_positions(contact, context.body)
-            damp_if_due(context, i, n, share * dt)
-            three_stage_nystroem(context, edge, dt, at, share)
-        if not end_substep(context, contact, edge, dt, share, at + share):
-            return i
-    return n
-
-
-@kernel
-def verlet_steps(
-    context: StepContext,
-    contact: ContactState,
-    edge: Edge,
-    dt: float,
-    begin: float,
-    end: float,
-    first: int,
-    n: int,
-) -> int:
-    """Take steps of position Verlet; see `runge_kutta_steps`.
-
-    Args:
-        context: What takes part.
-        contact: What may touch; positions and velocities are corrected after every step.
-        edge: The cutting edge over the time step.
-        dt: Length of the time step [s].
-        begin: Fraction of the time step at which to begin.
-        end: Fraction of the time step at which to end.
-        first: Step to begin with: 0, or where it stopped for want of room.
-        n: Number of steps from `begin` to `end`.
-    """
-    share = (end - begin) / n
-    for i in range(first, n):
-        at = begin + i * share
-        if contact.is_pending == 0:
-            if contact.is_awake == 1:
-                note_all_positions(contact, context.body)
-            damp_if_due(context, i, n, share * dt)
-            position_verlet(context, edge, dt, at, share)
-        if not end_substep(context, contact, edge, dt, share, at + share):
-            return i
-    return n
-
-
-@kernel
-def runge_kutta_steps_with_forces(
     context: StepContext, edge: Edge, dt: float, begin: float, end: float, n: int
 ) -> None:
-    """Take `n` Runge-Kutta steps in which contact acts as forces, each with its slip of the blade.
+    """Take `n` Runge-Kutta steps, each with its damping, its contact and the slip of the blade.
 
     Args:
         context: What takes part.
@@ -163,14 +47,14 @@ def runge_kutta_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         _runge_kutta_step(context, edge, dt, at, share)
-        _end_with_forces(context, edge, dt, share, at + share)
+        _end_step(context, edge, dt, share, at + share)
 
 
 @kernel
-def nystroem_steps_with_forces(
+def nystroem_steps(
     context: StepContext, edge: Edge, dt: float, begin: float, end: float, n: int
 ) -> None:
-    """Take `n` Nystroem steps of three stages; see `runge_kutta_steps_with_forces`.
+    """Take `n` Nystroem steps of three stages; see `runge_kutta_steps`.
 
     Args:
         context: What takes part.
@@ -185,14 +69,14 @@ def nystroem_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         three_stage_nystroem(context, edge, dt, at, share)
-        _end_with_forces(context, edge, dt, share, at + share)
+        _end_step(context, edge, dt, share, at + share)
 
 
 @kernel
-def verlet_steps_with_forces(
+def verlet_steps(
     context: StepContext, edge: Edge, dt: float, begin: float, end: float, n: int
 ) -> None:
-    """Take `n` steps of position Verlet; see `runge_kutta_steps_with_forces`.
+    """Take `n` steps of position Verlet; see `runge_kutta_steps`.
 
     Args:
         context: What takes part.
@@ -207,7 +91,7 @@ def verlet_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         position_verlet(context, edge, dt, at, share)
-        _end_with_forces(context, edge, dt, share, at + share)
+        _end_step(context, edge, dt, share, at + share)
 
 
 @kernel
@@ -261,10 +145,16 @@ def _runge_kutta_step(context: StepContext, edge: Edge, dt: float, at: float, sh
 
 
 @kernel
-def _end_with_forces(
-    context: StepContext, edge: Edge, dt: float, share: float, when: float
-) -> None:
-    """End a step in which contact acted as forces; see `end_substep`."""
+def _end_step(context: StepContext, edge: Edge, dt: float, share: float, when: float) -> None:
+    """End a step: contacts slide, forces are cleared, and the blade slips.
+
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        share: Length of the step as a fraction of the time step.
+        when: End of the step, as a fraction of the time step.
+    """
     seconds = share * dt
     body, external = context.body, context.stages.external
     end_contact_substep(context.contacts, body.positions, body.velocities, external)
@@ -275,77 +165,3 @@ def _end_with_forces(
     apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
     if context.attachments.n_caught > 0:
         slip_strands(context.attachments, body.positions, edge, when)
-
-
-@kernel
-def end_substep(
-    context: StepContext, contact: ContactState, edge: Edge, dt: float, share: float, when: float
-) -> bool:
-    """Resolve contact, then let the blade slip.
-
-    Args:
-        context: What takes part.
-        contact: What may touch.
-        edge: The cutting edge over the time step.
-        dt: Length of the time step [s].
-        share: Length of the step as a fraction of the time step.
-        when: End of the step, as a fraction of the time step.
-
-    Returns:
-        Whether contact had room. If not, make room and call again.
-    """
-    body, stages, seconds = context.body, context.stages, share * dt
-    if contact.is_awake == 1:
-        if contact.is_pending == 0 and context.contact_loss.is_counted == 1:
-            _note_state(body, stages)
-        contact.is_pending = 1
-        if not resolve(contact, body, seconds):
-            return False
-        contact.is_pending = 0
-        # Without contacts `resolve` has changed nothing.
-        if context.contact_loss.is_counted == 1 and contact.contacts.n_contacts > 0:
-            _count_loss(context, edge, when)
-    clear_attachment_forces(context.attachments, stages.external)
-    clear_geom_forces(context.geoms, stages.external)
-    clear_collapse_forces(context.elastic.collapsing, body, stages.external)
-    end_geom_substep(context.geoms, body, seconds, when, dt)
-    apply_slip(context.blade, body, context.visits, edge, stages.external, when, seconds)
-    if context.attachments.n_caught > 0:
-        slip_strands(context.attachments, body.positions, edge, when)
-    return True
-
-
-@kernel
-def _note_state(body: Body, stages: Stages) -> None:
-    for i in range(body.n_nodes):
-        store_point(stages.positions, i, point(body.positions, i))
-        store_point(stages.velocities, i, point(body.velocities, i))
-
-
-@kernel
-def _count_loss(context: StepContext, edge: Edge, when: float) -> None:
-    """Count what contact took since the state was noted."""
-    after = _energy(context, edge, when)
-    _swap_state(context.body, context.stages)
-    before = _energy(context, edge, when)
-    _swap_state(context.body, context.stages)
-    context.contact_loss.dissipated += before - after
-
-
-@kernel
-def _swap_state(body: Body, stages: Stages) -> None:
-    """Swap positions and velocities with those that were noted."""
-    for i in range(body.n_nodes):
-        x, v = point(body.positions, i), point(body.velocities, i)
-        store_point(body.positions, i, point(stages.positions, i))
-        store_point(body.velocities, i, point(stages.velocities, i))
-        store_point(stages.positions, i, x)
-        store_point(stages.velocities, i, v)
-
-
-@kernel
-def _energy(context: StepContext, edge: Edge, when: float) -> float:
-    """Return the energy of the body and of the anchors [J]."""
-    stored = body_energy(context.body, context.elastic, context.surroundings.gravity)
-    total: float = stored + edge_energy(context.blade, context.body, edge, when)
-    return total

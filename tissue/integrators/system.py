@@ -12,9 +12,8 @@ from tissue.blade.edge import Edge
 from tissue.blade.interaction import BladeInteraction
 from tissue.blade.wrench import BladeReport
 from tissue.blade_shape import BladeShape
-from tissue.contact.contact import Contact
 from tissue.contact.geoms.geom_contact import no_geoms
-from tissue.contact.self_contact import SelfContact
+from tissue.contact.penalty.penalty_contact import PenaltyContact
 from tissue.core.array_types import IntArray
 from tissue.core.thread_team import new_team
 from tissue.cut_settings import MeshMeasures
@@ -23,7 +22,6 @@ from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
 from tissue.integrators.attachments import no_attachments, strand_boxes
 from tissue.integrators.damping import Damping
-from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import damping_rate, stable_step
 from tissue.integrators.stages import new_stages
 from tissue.integrators.step_context import StepContext
@@ -60,7 +58,7 @@ class System:
         self,
         body: Body,
         elasticity: Elasticity,
-        contact: Contact,
+        contact: PenaltyContact,
         interaction: BladeInteraction,
         surroundings: Surroundings,
         visits: Visits,
@@ -83,13 +81,12 @@ class System:
             interval=1,
             owed=0.0,
             dissipated=0.0,
+            is_counted=0,
             rate_uncut=damping_rate(elasticity.arrays, surroundings),
             retardation_time=damped.retardation_time,
             drag=damped.drag,
         )
         """The damping that acts between steps, and what it has dissipated."""
-        self.contact_loss = ContactLoss(is_counted=0, dissipated=0.0)
-        """What contact takes from the energy, where that is counted."""
         self.supports = supports_at_rest()
         """Whether fixed nodes move, and their work."""
         self.attachments = no_attachments()
@@ -128,7 +125,6 @@ class System:
                 geoms=self.geoms.arrays,
                 surroundings=self._in_stages,
                 damping=self.damping,
-                contact_loss=self.contact_loss,
                 supports=self.supports,
                 attachments=self.attachments,
                 loose=self.loose,
@@ -149,12 +145,6 @@ class System:
             yield
         finally:
             self._in_stages, self.damping, self._context = in_stages, damping, None
-
-    @property
-    def hard_contact(self) -> SelfContact:
-        """Contact that corrects the motion, for integrators that take no other."""
-        assert isinstance(self.contact, SelfContact)
-        return self.contact
 
     def relax_stress(self, seconds: float) -> None:
         """Let the stress of the tissue relax where it is, for that time [s] or for ever (inf)."""
@@ -258,8 +248,6 @@ class System:
 class Numerics(NamedTuple):
     """How the motion of a body is computed, as far as its arrays depend on it."""
 
-    contact: str
-    """`impulses` or `penalty`; see `SolverSettings`."""
     mass_scaling: float | None
     """Frequency above which nodes get mass [1/s]; see `Elasticity`."""
     damps_between_steps: bool
@@ -299,14 +287,13 @@ def assembled(
     )
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
-    touching: Contact
-    if numerics.contact == "penalty":
-        # Imported late: kernels that are not used cost no start.
-        from tissue.contact.penalty.penalty_contact import PenaltyContact
-
-        highest = elasticity.frequency_squared
-        touching = PenaltyContact(body, node_size, material.friction, floor, highest)
-    else:
-        touching = SelfContact(body, node_size, material.friction, floor)
+    touching = PenaltyContact(
+        body,
+        node_size,
+        material.friction,
+        floor,
+        elasticity.frequency_squared,
+        acts=numerics.moves_together,
+    )
     owners = (body, elasticity, touching, interaction, surroundings, visits, node_size)
     return System(*owners, damps_between_steps=numerics.damps_between_steps)

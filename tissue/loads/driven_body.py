@@ -236,8 +236,7 @@ class DrivenBody(BodyQueries):
         """Move fixed nodes at a velocity, from the next step on until it is given anew.
 
         Their displacement in a step is the velocity times its length. Nodes that a cut puts between
-        them move with them. `settle` stops them. Their work is in the account of energy, but for
-        what they do in contacts that correct the motion (`contact="impulses"`).
+        them move with them. `settle` stops them. Their work is in the account of energy.
 
         Args:
             where: A region as text (`fixed_nodes`) or as a mask, shape (n_nodes,), of which the
@@ -266,7 +265,7 @@ class DrivenBody(BodyQueries):
         """Return the force of the supports on each fixed node now [N], shape (n_nodes, 3).
 
         Zero for nodes that are not fixed. It balances the elastic and viscous forces, the weight of
-        the node, loads, the blade, and contacts that act as forces (`contact="penalty"`).
+        the node, loads, the blade, and contacts of the body with itself and the floor.
         """
         system, n = self._system, self.n_nodes
         self._loads.spread(system.body, system.stages.loads)
@@ -345,7 +344,6 @@ class DrivenBody(BodyQueries):
         system = self._system
         self._attachments.end_increment(system.body, increment)
         touched = system.geoms.arrays
-        system.contact_loss.dissipated += touched.dissipated
         of_loads = self._loads.virtual_work(system.body) - before
         return of_loads + system.attachments.work + touched.work
 

@@ -27,8 +27,8 @@ from tissue.mesh.finite_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
 """Energy that may come out of nothing, as a strain of the whole body: a tenth of the speed of waves
-in all of its nodes. Contact by impulses lifts what has sunk into a floor, and a cut makes the
-tissue around it stiffer: both add energy that is not counted. More: a body may shake visibly before
+in all of its nodes. A cut makes the tissue around it stiffer: that adds energy that is not counted.
+More: a body may shake visibly before
 it is found. Less: see `SHARE_UNEXPLAINED`."""
 
 SHARE_UNEXPLAINED = 0.5

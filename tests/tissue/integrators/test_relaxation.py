@@ -5,7 +5,7 @@ import pytest
 from tests import bodies, strokes
 from tests.test_determinism import fingerprint
 from tissue import BladeShape, Material, SolverSettings, Tissue
-from tissue.integrators.staged_relaxation import relax_in_stages
+from tissue.integrators.hierarchical.stepper import relax_in_stages
 from tissue.mesh.tetrahedron_grid import no_grid
 
 MESH = bodies.jittered(4, 0)
@@ -21,7 +21,7 @@ def body(material=SOLID, relaxation="global", blade=None):
         material,
         fixed=bodies.sides(MESH),
         blade=blade,
-        solver=SolverSettings(relaxation=relaxation, contact="penalty"),
+        solver=SolverSettings(relaxation=relaxation),
     )
 
 

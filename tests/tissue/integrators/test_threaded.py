@@ -31,13 +31,7 @@ CASES = {
     "solid, single": (SOLID, {"precision": "single"}, 300),
     "solid, stress relaxes": (replace(SOLID, prony=((0.3, 0.1), (0.2, 5.0))), {"audit": True}, 300),
     "solid, damped in stages": (SOLID, {"relaxation": Global(damping="stage")}, 300),
-    "solid, contact as forces": (SOLID, {"contact": "penalty"}, 300),
     "solid, Verlet": (SOLID, {"relaxation": "verlet"}, 300),
-    "solid, Verlet, contact as forces": (
-        SOLID,
-        {"relaxation": "verlet", "contact": "penalty"},
-        300,
-    ),
     "undamped": (Material(retardation_time=0.0), {}, 300),
 }
 """Material, settings, and number of steps of 1 ms."""

@@ -22,7 +22,6 @@ from tissue.contact.penalty.contact_forces import (
     new_penalty_forces,
 )
 from tissue.contact.penalty.contact_list import DIRECTIONS, floor_changes
-from tissue.contact.penalty.contact_work import end_contact_substep
 from tissue.contact.penalty.folds import grown_folds, look_for_folds, new_folds
 from tissue.contact.penalty.near_pairs import grown_near_pairs, new_near_pairs
 from tissue.contact.penalty.node_ways import grown_node_ways, new_node_ways
@@ -77,6 +76,7 @@ class PenaltyContact:
         friction: Coefficient of friction.
         floor: Height of the floor [m], or None.
         frequency_squared: Bound on w^2 of the body before any cut [1/s2].
+        acts: Whether there is contact; if not, nothing ever touches.
     """
 
     def __init__(
@@ -86,6 +86,8 @@ class PenaltyContact:
         friction: float,
         floor: float | None,
         frequency_squared: float,
+        *,
+        acts: bool = True,
     ) -> None:
         n_nodes = len(body.rest)
         added = max(ADDED_SHARE * frequency_squared, LEAST_ADDED)
@@ -130,12 +132,8 @@ class PenaltyContact:
         self._is_searched = self._has_looked = False
         self._n_contacts = 0
         self._has_touched = False
+        self._acts = acts
         self._find_pieces(body)
-
-    @property
-    def is_awake(self) -> bool:
-        """Whether there is anything that could touch."""
-        return self._is_awake
 
     @property
     def is_touching(self) -> bool:
@@ -153,7 +151,7 @@ class PenaltyContact:
         Returns:
             Whether anything could touch.
         """
-        if not self._has_looked:
+        if self._acts and not self._has_looked:
             self._has_looked = True
             search = self._search
             has_folds = _FOLDS.call(search.folds, search.ways, search.faces, body)
@@ -216,15 +214,10 @@ class PenaltyContact:
         self._n_contacts = self.forces.n_contacts
         self._has_touched = self._has_touched or self._n_contacts > 0
 
-    def end_substep(self, body: Body, external: FloatArray, seconds: float) -> None:
-        """Let what slides slide on after a substep, and clear the forces [N] on the nodes."""
-        end_contact_substep(self.forces, body.positions, body.velocities, external)
-
-    def start_substep(self, body: Body) -> None:
-        """Do nothing: contact depends on no position before a substep."""
-
     def mesh_changed(self, body: Body, change: Change) -> None:
         """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""
+        if not self._acts:
+            return
         faces = with_room(self._search.faces, 4 * change.n_dirty)
         update_changed_faces(faces, body, change)
         self._take_faces(faces)
@@ -254,6 +247,8 @@ class PenaltyContact:
 
     def _find_pieces(self, body: Body) -> None:
         """Find out whether the body is in pieces; their skin may touch then, too."""
+        if not self._acts:
+            return
         faces = with_found_pieces(self._search.faces, body)
         if faces is not None:
             self._take_skin(faces)

@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from tissue.contact.distance import distance_of_edges
-from tissue.contact.edge_edge import SAME_SIDE, Edges, face_the_same_side
+from tissue.contact.edge_edge import SAME_SIDE, Edges, distance_of_edges, face_the_same_side
 from tissue.contact.faces import Faces
 from tissue.contact.penalty.eight_contacts import FourPoints
 from tissue.contact.penalty.eight_edges import WIDER, squared_distances

@@ -6,8 +6,14 @@ the normals of the two faces there. Any other direction is one of a node and a f
 
 from typing import NamedTuple
 
-from tissue.contact.distance import distance_of_edges
-from tissue.contact.edge_edge import Crossing, Edges, crossing_of, is_inner, separation
+from tissue.contact.edge_edge import (
+    Crossing,
+    Edges,
+    crossing_of,
+    distance_of_edges,
+    is_inner,
+    separation,
+)
 from tissue.contact.node_normals import has_inverted
 from tissue.contact.penalty.near_pairs import CONTACT_REACH
 from tissue.contact.penalty.ridge_pairs import NOT_LISTED, outward_at

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tissue.blade.blade_context import BladeContext
-from tissue.blade.forces import frequency_with_blade
-from tissue.contact.resolve import note_all_positions
+from tissue.blade.forces import apply_slip, frequency_with_blade
 from tissue.core.array_types import IntArray
 from tissue.integrators.hierarchical.focus import find_held, find_rings
 from tissue.integrators.hierarchical.kernels import (
@@ -20,11 +19,11 @@ from tissue.integrators.hierarchical.kernels import (
 from tissue.integrators.hierarchical.node_rings import grown_rings, new_rings
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.stability import SAFETY, largest_stable_step
-from tissue.integrators.staged_relaxation import relax_in_stages
 from tissue.integrators.step_context import Increment
-from tissue.integrators.step_end import end_step
 from tissue.integrators.system import System
+from tissue.integrators.unstable import not_finite
 from tissue.mesh.body import Body
+from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
 from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 
 
@@ -72,16 +71,15 @@ class HierarchicalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by one frame; return how many steps the nodes of the focus took."""
-        options, body, contact = self._options, system.body, system.hard_contact
+        options, body, edge = self._options, system.body, increment.edge
         self._find_rings(system)
         n, every = self._divide(system, increment.span)
-        if contact.is_awake:
-            note_all_positions(contact.arrays, body)
         times = (increment.dt, increment.begin, increment.end)
         frame = FrameTimes(*times, n, options.rings, self._is_far_frozen)
         rings, trails = self._rings, self._trails
-        hierarchical_frame(system.context, increment.edge, rings, trails, every, frame)
-        end_step(system, increment, increment.span, increment.end)
+        hierarchical_frame(system.context, edge, rings, trails, every, frame)
+        blade, external = system.interaction.state, system.stages.external
+        apply_slip(blade, body, system.visits, edge, external, increment.end, increment.span)
         note_moved(self._moved, rings.order, rings.n_found)
         return n
 
@@ -139,3 +137,46 @@ def ring_steps(options: Hierarchical, needed: Sequence[float]) -> tuple[int, Int
             while steps[ring] < steps[ring + 1]:
                 steps[ring] *= 2
     return steps[0], steps[0] // np.array(steps)
+
+
+def relax_in_stages(
+    integrator: HierarchicalStepper,
+    system: System,
+    blade: BladeContext,
+    increment: Increment,
+    has_blade: bool,
+) -> int:
+    """Relax by an increment; return the steps taken. See `Integrator.relax`.
+
+    Args:
+        integrator: Advances the motion.
+        system: Body, forces and contact.
+        blade: What searches of the blade work on.
+        increment: The part of a time step to advance by.
+        has_blade: Whether there is a blade.
+
+    Raises:
+        TissueError: the motion became unstable.
+    """
+    interaction, edge = system.interaction, increment.edge
+    faces_of = edge if has_blade else None
+    interaction.update_faces(blade, integrator.moved, faces_of, increment.begin)
+    n = integrator.advance(system, increment) if increment.span > 0.0 else 0
+    if n > 0:
+        system.relax_stress(increment.span)
+        if integrator.moving is None:
+            system.find_new_loose_pieces()
+        if not _update_bounds(integrator, system, blade):
+            raise not_finite()
+    if has_blade:
+        external, blade = system.stages.external, interaction.renewed(blade)
+        interaction.update_anchors(blade, external, integrator.moved, edge, increment.end)
+    return n
+
+
+def _update_bounds(integrator: HierarchicalStepper, system: System, blade: BladeContext) -> bool:
+    """Update the box around the body; return whether all positions are finite."""
+    moving, body = integrator.moving, system.body
+    if moving is None or 2 * moving[1] > body.n_nodes:
+        return write_bounds(body, blade.bounds)
+    return widen_bounds(body, moving[0], moving[1], blade.bounds)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
-from tests.test_penalty_contact import PENALTY, pressed_blocks
+from tests.test_contact import pressed_blocks
 from tissue import Material, Tissue, block
 
 
@@ -19,7 +19,7 @@ def cut_block() -> Tissue:
     """Return a block that a stroke has cut in two, one part of which falls on the floor."""
     mesh = block((4, 3, 3), (0.04, 0.03, 0.03))
     fixed = mesh.positions[:, 0] <= 0.02
-    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.02, solver=PENALTY)
+    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.02)
     strokes.make(tissue, strokes.straight(mesh, 0.75))
     return tissue
 
@@ -28,7 +28,7 @@ def squeezed_block() -> Tissue:
     """Return a block with a ragged cut whose lips press on each other under gravity."""
     mesh = bodies.jittered(3, 0)
     fixed = mesh.positions[:, 2] < 1e-3
-    tissue = Tissue(mesh, Material(viscous_damping=5.0), fixed=fixed, solver=PENALTY)
+    tissue = Tissue(mesh, Material(viscous_damping=5.0), fixed=fixed)
     edges = [[(-0.01, y, 0.0207), (0.05, y, 0.0187)] for y in (-0.01, 0.02, 0.06)]
     assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
     return tissue

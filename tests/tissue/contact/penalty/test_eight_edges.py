@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tissue.contact.distance import distance_of_edges
-from tissue.contact.edge_edge import Edges, crossing_of, is_inner
+from tissue.contact.edge_edge import Edges, crossing_of, distance_of_edges, is_inner
 from tissue.contact.penalty.eight_contacts import points_of_contacts
 from tissue.contact.penalty.eight_edges import crossing_bits, squared_distances
 from tissue.core.jit import kernel

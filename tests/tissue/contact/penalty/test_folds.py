@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.test_contact import joined
+from tests.overlaps import joined
 from tissue import TetrahedralMesh, block
 from tissue.contact.faces import new_faces, with_found_pieces
 from tissue.contact.penalty.folds import APART, NEAR, OPPOSITE, look_for_folds, new_folds

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests import strokes
-from tests.test_penalty_contact import pressed_blocks
+from tests.test_contact import pressed_blocks
 from tests.tissue.contact.penalty.test_calm import cut_block
 from tissue.contact.penalty.ridge_prefilter import (
     crossing_ridges,

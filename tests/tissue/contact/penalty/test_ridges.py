@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
+from tests.overlaps import NO_GRAVITY, joined
 from tests.test_conservation import momentum
-from tests.test_contact import NO_GRAVITY, joined
 from tests.tissue.contact.penalty.two_blocks import SIZE, TwoBlocks
-from tissue import Material, SolverSettings, TetrahedralMesh, Tissue
+from tissue import Material, TetrahedralMesh, Tissue
 from tissue.contact.penalty.near_pairs import CONTACT_REACH
 
 pytestmark = pytest.mark.kernel
@@ -100,7 +100,7 @@ def two_roofs(beside: float) -> Tissue:
     """Return a roof that falls on another, `beside` it along y [m], from 0.5 mm above."""
     mesh = joined(roof(False), roof(True), (0.0, beside, 0.0105))
     free = Material(30e3, viscous_damping=0.0, retardation_time=0.0, friction=0.0)
-    tissue = Tissue(mesh, free, gravity=NO_GRAVITY, solver=SolverSettings(contact="penalty"))
+    tissue = Tissue(mesh, free, gravity=NO_GRAVITY)
     tissue._body.velocities[4:8] = FALLING
     return tissue
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.test_contact import joined
+from tests.overlaps import joined
 from tissue import block
 from tissue.contact.faces import new_faces, with_found_pieces
 from tissue.contact.node_normals import update_normals
