@@ -23,10 +23,10 @@ from scalpel_sim.output.run_folder import (
     grasp_file,
 )
 from scalpel_sim.output.summary import COMPLETE, Summary
+from scalpel_sim.recording.file_sum import FileSum, sum_of
 from scalpel_sim.scene_file.writing import relative_path, scene_text
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.state.file_sum import FileSum, sum_of
 from scalpel_sim.state.run_notes import RunPlan
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.strokes.asked_area import asked_area

@@ -23,8 +23,8 @@ from bridge import TissueFrame, compiled_arithmetic
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.stroke_follower import StrokeFollower
-from scalpel_sim.output.force_parts import force_parts
-from scalpel_sim.output.frame_row import FrameRows, WallTimes
+from scalpel_sim.recording.force_parts import force_parts
+from scalpel_sim.recording.frame_row import FrameRows, WallTimes
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.scenes import PARENCHYMA, PHANTOM
 from scalpel_sim.stop_signals import SignalInterrupt, StopSignals

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from scalpel_sim.output.recording import read_forces
+from scalpel_sim.recording.recording import read_forces
 from tissue import read_mesh
 
 

@@ -24,9 +24,9 @@ from scalpel_sim.bench.results import (
 from scalpel_sim.bench.tables import compact_table
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
-from scalpel_sim.output.recording import Recording
 from scalpel_sim.output.summary import STAGES
 from scalpel_sim.output.table_1 import MACHINE, TABLE_1
+from scalpel_sim.recording.recording import Recording
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_parts.choices import SCHEMES
 from scalpel_sim.scene_parts.scene import Scene

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.output.recording import Recording
+from scalpel_sim.recording.recording import Recording
 from tissue import FloatArray, IntArray
 
 SHORTEST = 5e-3

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from scalpel_sim.output.energy_terms import TERMS, Term
 from scalpel_sim.output.force_plot import DOTS_PER_INCH, MAGNITUDE, legend, simplify
-from scalpel_sim.output.recording import Recording
+from scalpel_sim.recording.energy_terms import TERMS, Term
+from scalpel_sim.recording.recording import Recording
 
 _MJ_PER_J = 1e3
 PERCENT = 100.0

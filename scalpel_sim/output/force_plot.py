@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from scalpel_sim.output.recording import Recording
+from scalpel_sim.recording.recording import Recording
 
 # Okabe and Ito's palette, which colour-blind readers can distinguish too.
 COMPONENTS = (("x", "#d55e00"), ("y", "#009e73"), ("z", "#0072b2"))

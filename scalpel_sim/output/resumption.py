@@ -10,7 +10,6 @@ import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.checkpoints import Checkpoints
-from scalpel_sim.output.recording import WALL_TIMES, Recording, read_forces
 from scalpel_sim.output.run_folder import (
     FORCES,
     INITIAL,
@@ -21,9 +20,10 @@ from scalpel_sim.output.run_folder import (
     SUMMARY,
 )
 from scalpel_sim.output.summary import COMPLETE
+from scalpel_sim.recording.file_sum import FileSum, sum_of, sums_that_hold
+from scalpel_sim.recording.recording import WALL_TIMES, Recording, read_forces
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state.checkpoint import Checkpoint
-from scalpel_sim.state.file_sum import FileSum, sum_of, sums_that_hold
 from scalpel_sim.state.run_notes import RunMark, RunPlan, read_journal
 from scalpel_sim.state.simulation_state import SimulationState
 from tissue import FloatArray, whole_file

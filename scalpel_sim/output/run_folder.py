@@ -14,12 +14,12 @@ from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.checkpoints import CHECKPOINT_FILES
 from scalpel_sim.output.disk_reserve import DiskReserve
 from scalpel_sim.output.folder_lock import FolderLock
-from scalpel_sim.output.growing_file import GrowingFile
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS, Recording, lines_of_rows
 from scalpel_sim.output.run_journal import RunJournal
 from scalpel_sim.output.summary import Summary, summary_json
-from scalpel_sim.state.file_sum import FileSum
+from scalpel_sim.recording.file_sum import FileSum
+from scalpel_sim.recording.growing_file import GrowingFile
+from scalpel_sim.recording.recording import COLUMNS, Recording, lines_of_rows
 from scalpel_sim.state.run_notes import RunMark, RunPlan, line_of
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from scalpel_sim.output.growing_file import GrowingFile
-from scalpel_sim.state.file_sum import FileSum
+from scalpel_sim.recording.file_sum import FileSum
+from scalpel_sim.recording.growing_file import GrowingFile
 from scalpel_sim.state.run_notes import RunMark, RunPlan, line_of
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bridge import TissueDescription, TissueFrame
-from scalpel_sim.output.recording import Recording
+from scalpel_sim.recording.recording import Recording
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import first_areas
 from scalpel_sim.strokes.asked_pieces import asked_pieces, n_large

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from scalpel_sim.state.file_sum import FileSum
+from scalpel_sim.recording.file_sum import FileSum
 
 _CRC = 8
 """Digits of the checksum of a line."""

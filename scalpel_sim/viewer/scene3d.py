@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from scalpel_sim.output.energy_terms import TERMS
-from scalpel_sim.output.force_parts import ForceParts
+from scalpel_sim.recording.energy_terms import TERMS
+from scalpel_sim.recording.force_parts import ForceParts
 from scalpel_sim.tables.view import DEFAULT_FOV
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import Energies, FloatArray, IntArray

@@ -10,8 +10,8 @@ from time import sleep
 import numpy as np
 import pytest
 
-from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.summary import COMPLETE
+from scalpel_sim.recording.recording import read_forces
 from tests.battery import battery
 from tests.processes import start
 from tests.scalpel_sim.output.killed_runs import figures, physics

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scalpel_sim import SCENES, SimulationState, prepare
-from scalpel_sim.output.recording import WALL_TIMES
+from scalpel_sim.recording.recording import WALL_TIMES
 from scalpel_sim.scene_parts.scene import changed
 from tests.battery import battery
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from bridge import TcpLink
 from bridge.tcp.server import TissueServer
-from scalpel_sim.output.recording import COLUMNS
+from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.tables.view import sent_views
 

@@ -13,8 +13,8 @@ import time
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.run_folder import RUN_FILES, STROKE
+from scalpel_sim.recording.recording import read_forces
 from tests.processes import PROGRAM, environment, start, wait_for_rows, wait_until_heard
 from tests.run_files import names_in
 from tests.small_disk import run_on_a_small_disk

@@ -9,7 +9,7 @@ import pytest
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
-from scalpel_sim.output.recording import COLUMNS, held_columns, read_forces
+from scalpel_sim.recording.recording import COLUMNS, held_columns, read_forces
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.tables.attachment import AttachmentTable, check_attachment, times_of
 from tests.scalpel_sim.served_scenes import served, untimed

@@ -10,7 +10,7 @@ from bridge import InProcessLink, LinkError, SceneView
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
-from scalpel_sim.output.recording import read_forces
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scenes import SCENES, scene_of
 from scalpel_sim.tables.view import ViewTable

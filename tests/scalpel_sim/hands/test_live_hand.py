@@ -15,8 +15,8 @@ from scalpel_sim.hands.limited_pose import (
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.workspace import ROOM
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS
 from scalpel_sim.output.run_folder import FINAL, STROKE, Outputs
+from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.run import REST_AFTER_STROKE
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS

@@ -21,7 +21,7 @@ from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.cli.scripted_run import perform_script
 from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS
+from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.state.checkpoint import read_checkpoint
 from tests.scalpel_sim.output.killed_runs import Killed, at
 

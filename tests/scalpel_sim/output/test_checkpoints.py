@@ -5,8 +5,8 @@ import resource
 import pytest
 
 from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
+from scalpel_sim.recording.file_sum import FileSum
 from scalpel_sim.state.checkpoint import Checkpoint, CheckpointHead, read_checkpoint
-from scalpel_sim.state.file_sum import FileSum
 from scalpel_sim.state.run_notes import RunMark, RunPlan
 from tissue import StateError
 

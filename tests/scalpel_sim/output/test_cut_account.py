@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.output.cut_account import area_unpaid, energy_released
-from scalpel_sim.output.recording import COLUMNS, Recording
+from scalpel_sim.recording.recording import COLUMNS, Recording
 
 J = 20.0
 DEPTH, LENGTH, NODE_SIZE = 0.01, 0.06, 0.0035

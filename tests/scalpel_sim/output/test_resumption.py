@@ -11,7 +11,6 @@ from scalpel_sim import SCENES
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Engage, Release, Undo
 from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
-from scalpel_sim.output.recording import COLUMNS, Recording, read_forces
 from scalpel_sim.output.resumption import resumption_of
 from scalpel_sim.output.run_folder import (
     FRAMES_PER_FLUSH,
@@ -19,6 +18,7 @@ from scalpel_sim.output.run_folder import (
     REPLAY_FRAMES,
     Outputs,
 )
+from scalpel_sim.recording.recording import COLUMNS, Recording, read_forces
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.state.checkpoint import read_checkpoint
 from tests.scalpel_sim.output.killed_runs import (

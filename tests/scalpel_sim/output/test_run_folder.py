@@ -12,10 +12,8 @@ from rich.console import Console
 
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.energy_plot import OPACITY, plot_energies
-from scalpel_sim.output.energy_terms import TERMS
 from scalpel_sim.output.force_plot import HAND_COLOURS, LIMITED, PARTS, plot_forces
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS, Recording, columns_of_hand, read_forces
 from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.run_folder import (
     ENERGY_PLOT,
@@ -27,6 +25,8 @@ from scalpel_sim.output.run_folder import (
     Outputs,
 )
 from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_json
+from scalpel_sim.recording.energy_terms import TERMS
+from scalpel_sim.recording.recording import COLUMNS, Recording, columns_of_hand, read_forces
 from tests.run_files import names_in
 from tissue import CutReport, Energies, MeshMeasures, Snapshot, block, pieces_of
 

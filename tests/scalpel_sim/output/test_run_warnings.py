@@ -10,9 +10,9 @@ import pytest
 
 from scalpel_sim import Scene, StrokeTable, prepare
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.recording import COLUMNS, Recording, columns_of_hand
 from scalpel_sim.output.run_outcome import outcome_of
 from scalpel_sim.output.run_warnings import warnings_of
+from scalpel_sim.recording.recording import COLUMNS, Recording, columns_of_hand
 from scalpel_sim.run import run_time
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import Stroke

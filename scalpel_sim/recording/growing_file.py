@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from scalpel_sim.state.file_sum import FileSum
+from scalpel_sim.recording.file_sum import FileSum
 
 
 class GrowingFile:

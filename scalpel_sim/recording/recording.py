@@ -10,7 +10,7 @@ from typing import BinaryIO
 import msgspec
 import numpy as np
 
-from scalpel_sim.output.row_store import RowStore
+from scalpel_sim.recording.row_store import RowStore
 from tissue import Energies, FloatArray
 
 ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")

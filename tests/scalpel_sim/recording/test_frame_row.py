@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bridge import TissueFrame
-from scalpel_sim.output.force_parts import force_parts
-from scalpel_sim.output.frame_row import FrameRows, WallTimes
-from scalpel_sim.output.recording import COLUMNS
+from scalpel_sim.recording.force_parts import force_parts
+from scalpel_sim.recording.frame_row import FrameRows, WallTimes
+from scalpel_sim.recording.recording import COLUMNS
 from tissue import BladeSegment, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from scalpel_sim.output.growing_file import GrowingFile
+from scalpel_sim.recording.growing_file import GrowingFile
 
 HEAD = b"a,b\n"
 ROWS = b"1,2\n3,4\n"

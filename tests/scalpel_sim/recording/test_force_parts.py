@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
-from scalpel_sim.output.force_parts import EDGE_COSINE, force_parts
-from scalpel_sim.output.recording import COLUMNS
+from scalpel_sim.recording.force_parts import EDGE_COSINE, force_parts
+from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.scene_parts.scene import changed
 from tissue import RigidContacts
 

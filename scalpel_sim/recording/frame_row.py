@@ -1,4 +1,4 @@
-"""One frame as a row of `forces.csv`: see `scalpel_sim.output.recording.COLUMNS`."""
+"""One frame as a row of `forces.csv`: see `scalpel_sim.recording.recording.COLUMNS`."""
 
 import math
 from typing import NamedTuple
@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.output.force_parts import add_up, force_parts
-from scalpel_sim.output.recording import N_OF_ACCOUNT
+from scalpel_sim.recording.force_parts import add_up, force_parts
+from scalpel_sim.recording.recording import N_OF_ACCOUNT
 from tissue import BladeSegment, Energies, FloatArray, StepResult, Wrench, kernel
 
 NO_ACCOUNT = (math.nan,) * N_OF_ACCOUNT

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from scalpel_sim.errors import RunError
-from scalpel_sim.output.unnamed_file import unnamed_file
+from scalpel_sim.recording.unnamed_file import unnamed_file
 from tissue import FloatArray
 
 ROWS_IN_MEMORY = 8192
