@@ -28,7 +28,7 @@ PARTS = (
     "scalpel_sim.arm.arm:Arm.step1",
     "scalpel_sim.arm.arm:Arm.step2",
     "scalpel_sim.arm.arm:Arm.check",
-    "scalpel_sim.arm.stroke_follower:StrokeFollower.lead",
+    "scalpel_sim.instruments.stroke_follower:StrokeFollower.lead",
     "scalpel_sim.arm.blade:Blade.segment",
     "scalpel_sim.arm.blade:Blade.apply",
     "scalpel_sim.arm.collision_monitor:CollisionMonitor.check",

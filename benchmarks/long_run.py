@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from scalpel_sim import SCENES, Simulation, prepare
-from scalpel_sim.output.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import Outputs
-from scalpel_sim.run import perform
+from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
+from scalpel_sim.runs.run import perform
+from scalpel_sim.runs.run_folder import Outputs
 
 N_LOOKS = 10
 MILLISECONDS = 1e3

@@ -23,7 +23,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from scalpel_sim.arm.scalpel import SCALPEL
+from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene_parts.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.stroke import Stroke

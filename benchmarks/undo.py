@@ -16,7 +16,7 @@ from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.pace import Pace
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import Outputs
+from scalpel_sim.runs.run_folder import Outputs
 
 N_TIMES = 10
 WAY = 0.035

@@ -7,7 +7,7 @@ import sys
 from typing import NoReturn
 
 from scalpel_sim.errors import EXIT_RUN_FAILED
-from scalpel_sim.stop_signals import ignore_signals, interrupt_on_signals, raised_signal
+from scalpel_sim.runs.stop_signals import ignore_signals, interrupt_on_signals, raised_signal
 
 
 def main() -> None:
@@ -38,7 +38,7 @@ def main() -> None:
 def _end_at_once(code: int) -> NoReturn:
     """End the process without taking down what was loaded.
 
-    What a signal has interrupted stays as it is: see `scalpel_sim.stop_signals`.
+    What a signal has interrupted stays as it is: see `scalpel_sim.runs.stop_signals`.
     """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):  # nobody reads it any more

@@ -11,11 +11,11 @@ import numpy as np
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.led_grasper import LedGrasper
-from scalpel_sim.arm.stroke_follower import StrokeFollower
+from scalpel_sim.instruments.led_grasper import LedGrasper
+from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.recording.frame_row import FrameRows, WallTimes
 from scalpel_sim.recording.recording import Recording, columns_of_hand, held_columns
-from scalpel_sim.state.simulation_state import SimulationState
+from scalpel_sim.state import SimulationState
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray, StageTimes, StepResult, Wrench
 

@@ -5,9 +5,9 @@ Else each process of the tests compiles them for itself, as they need them at th
 
 import pytest
 
-from scalpel_sim.cli.console import compiling
-from scalpel_sim.cli.options import PrintOptions
-from scalpel_sim.warm_up import USUAL_SETS, KernelSet, compile_ahead
+from scalpel_sim.runs.console import compiling
+from scalpel_sim.runs.options import PrintOptions
+from scalpel_sim.runs.warm_up import USUAL_SETS, KernelSet, compile_ahead
 
 DOUBLE = KernelSet(precision="double", audit=False)
 SPRINGS = KernelSet(law="springs", audit=False)

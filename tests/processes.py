@@ -12,7 +12,7 @@ from pathlib import Path
 from time import sleep
 from typing import Any
 
-from scalpel_sim.stop_signals import SIGNALS
+from scalpel_sim.runs.stop_signals import SIGNALS
 
 PROGRAM = (sys.executable, "-m", "scalpel_sim")
 

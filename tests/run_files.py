@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from scalpel_sim.output.run_folder import PASSING_FILES
+from scalpel_sim.runs.file_names import PASSING_FILES
 
 
 def names_in(folder: str | Path) -> list[str]:

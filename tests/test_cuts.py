@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.arm.scalpel import SCALPEL
+from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene_parts.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from tests import bodies, soundness, strokes

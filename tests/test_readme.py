@@ -9,7 +9,7 @@ import pytest
 from cyclopts import App
 
 from scalpel_sim.cli.app import app, command_line
-from scalpel_sim.output.run_folder import RUN_FILES
+from scalpel_sim.runs.file_names import RUN_FILES
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from scalpel_sim.bench.watch import Watch, watching
-from scalpel_sim.cli.console import log_to_stderr
-from scalpel_sim.cli.options import Flag, PrintOptions
 from scalpel_sim.errors import UsageError
+from scalpel_sim.runs.console import log_to_stderr
+from scalpel_sim.runs.options import Flag, PrintOptions
 
 if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.bench.results import BenchmarkResult, SavedResults
@@ -231,8 +231,8 @@ def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: Print
         results_as_json,
         save_results,
     )
-    from scalpel_sim.cli.run_setup import load_kernels
     from scalpel_sim.output.file_check import check_file
+    from scalpel_sim.runs.prepared_run import load_kernels
 
     if not 1 <= options.runs <= MOST_ROUNDS:
         raise UsageError(f"--runs is {options.runs}; it must be from 1 to {MOST_ROUNDS}")

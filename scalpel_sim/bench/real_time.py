@@ -27,7 +27,7 @@ from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation import prepare
-from scalpel_sim.run import run_time
+from scalpel_sim.runs.run import run_time
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_parts.choices import can_audit
 from scalpel_sim.scene_parts.scene import Scene

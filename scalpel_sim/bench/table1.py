@@ -26,12 +26,12 @@ from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.output.summary import STAGES
 from scalpel_sim.output.table_1 import MACHINE, TABLE_1
+from scalpel_sim.planned_cut import PlannedCut, prepare_cut
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_parts.choices import SCHEMES
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import DrawFrame, Simulation
-from scalpel_sim.strokes.cuts import PlannedCut, prepare_cut
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings

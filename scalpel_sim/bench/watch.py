@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from scalpel_sim.cli.options import PrintOptions
+from scalpel_sim.runs.options import PrintOptions
 
 if TYPE_CHECKING:
     from rich.progress import Progress

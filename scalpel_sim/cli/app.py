@@ -9,28 +9,10 @@ from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
-from scalpel_sim.cli.console import (
-    expect_no_warnings,
-    log_to_stderr,
-    print_report,
-    say,
-    say_error,
-)
 from scalpel_sim.cli.new_command import new
-from scalpel_sim.cli.options import (
-    CONNECTION,
-    DEVICE,
-    OUTPUT,
-    ArmOptions,
-    ClientOptions,
-    DeviceOptions,
-    Flag,
-    PrintOptions,
-    RunOutputOptions,
-    SceneName,
-    TissueOptions,
-)
+from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
 from scalpel_sim.cli.spacemouse_command import spacemouse
+from scalpel_sim.cli.validate_command import validate
 from scalpel_sim.cli.view_command import view
 from scalpel_sim.cli.warm_up_command import warm_up
 from scalpel_sim.errors import (
@@ -43,8 +25,24 @@ from scalpel_sim.errors import (
 )
 from scalpel_sim.figures.command import figure
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.stop_signals import raised_signal
-from scalpel_sim.validate.command import validate
+from scalpel_sim.runs.console import (
+    expect_no_warnings,
+    log_to_stderr,
+    print_report,
+    say,
+    say_error,
+)
+from scalpel_sim.runs.options import (
+    CONNECTION,
+    DEVICE,
+    OUTPUT,
+    ClientOptions,
+    DeviceOptions,
+    Flag,
+    PrintOptions,
+    RunOutputOptions,
+)
+from scalpel_sim.runs.stop_signals import raised_signal
 from scalpel_sim.version import version
 
 PROGRAM = "scalpel-sim"
@@ -91,10 +89,10 @@ def _run(
             you choose another or the tissue stiffens.
     """
     with log_to_stderr(printing), Plotter() as plotter:  # it loads while the run is prepared
-        from scalpel_sim.cli.device_run import check_device_options, device_run, perform_device
         from scalpel_sim.cli.resumed_run import perform_resumed
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
-        from scalpel_sim.cli.scripted_run import perform_script
+        from scalpel_sim.runs.device_run import check_device_options, device_run, perform_device
+        from scalpel_sim.runs.prepared_run import perform_script
 
         options = RunOptions(tissue, arm, client, output, printing)
         is_led = hand == "device"
@@ -115,9 +113,9 @@ def _run(
         ) as prepared:
             if is_led:
                 with device_run(prepared, device) as led:
-                    summary = perform_device(prepared, options, plotter, led)
+                    summary = perform_device(prepared, plotter, led)
             else:
-                summary = perform_script(prepared, options, plotter)
+                summary = perform_script(prepared, plotter)
             print_report(summary, prepared.folder, output.export, printing)
         expect_no_warnings(summary, output)
 
@@ -156,8 +154,9 @@ def _serve(
     """
     from bridge import chosen_key
     from bridge import serve as serve_tissue
-    from scalpel_sim.cli.run_setup import load_kernels, springs_as_asked
+    from scalpel_sim.cli.run_setup import springs_as_asked
     from scalpel_sim.cli.scene_options import chosen_scene
+    from scalpel_sim.runs.prepared_run import load_kernels
     from scalpel_sim.scene_body import check_scene, make_tissue
     from scalpel_sim.tables.view import sent_views
 

@@ -3,10 +3,10 @@
 import textwrap
 from pathlib import Path
 
-from scalpel_sim.arm.scalpel import SCALPEL
 from scalpel_sim.cli.materials import chosen_presets
 from scalpel_sim.cli.new_file import write_new_file
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scenes import PHANTOM
 from scalpel_sim.tables.toml import SUFFIX
 from tissue import BladeShape, Material, Preset, SourcedValue

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from scalpel_sim.cli.console import log_to_stderr
-from scalpel_sim.cli.options import OUTPUT, Flag, PrintOptions
+from scalpel_sim.runs.console import log_to_stderr
+from scalpel_sim.runs.options import OUTPUT, Flag, PrintOptions
 
 
 def new(

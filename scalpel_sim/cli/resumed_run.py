@@ -4,15 +4,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from scalpel_sim.cli.options import given_options
-from scalpel_sim.cli.run_setup import PreparedRun, RunOptions, prepared_run
-from scalpel_sim.cli.scripted_run import perform_script
+from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.resumption import Resumption, resumption_of
-from scalpel_sim.output.run_folder import SCENE, check_folder
 from scalpel_sim.output.summary import Summary
+from scalpel_sim.runs.file_names import SCENE
+from scalpel_sim.runs.prepared_run import PreparedRun, perform_script
+from scalpel_sim.runs.resumption import Resumption, resumption_of
+from scalpel_sim.runs.run_folder import check_folder
 from scalpel_sim.scenes import read_scene
-from scalpel_sim.strokes.led_record import end_record
+from tissue import whole_file
 
 
 def perform_resumed(
@@ -47,7 +48,7 @@ def perform_resumed(
         exports = tuple(map(Path, resumption.plan.exports))
     options = options._replace(output=replace(options.output, out=folder, export=exports))
     with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
-        return perform_script(prepared, options, plotter, resumption=resumption), prepared
+        return perform_script(prepared, plotter, resumption=resumption), prepared
 
 
 def _expect_no_options(options: RunOptions) -> None:
@@ -84,3 +85,26 @@ def _end_records(folder: Path, resumption: Resumption) -> None:
             raise RunError(
                 f"{path}: what the hand did cannot be read ({error}), and the run cannot go on"
             ) from error
+
+
+def end_record(path: Path, t_end: float, n_bytes: int | None = None) -> None:
+    """Cut off a last line that is not whole, and have the last pose last until a time.
+
+    Until then the hand rested, or it would have left another row.
+
+    Args:
+        path: `stroke.csv`, or the file of a grasper.
+        t_end: Simulated time [s].
+        n_bytes: How much of it is kept [bytes]; None: all.
+
+    Raises:
+        OSError: the file cannot be read or written.
+    """
+    text = path.read_bytes()[:n_bytes].decode("ascii")
+    lines = [line for line in text.splitlines(True) if line.endswith("\n")]
+    if len(lines) > 1:
+        last, _, pose = lines[-1].partition(",")
+        if float(last) < t_end:
+            lines.append(f"{t_end!r},{pose}")
+    with whole_file(path) as unfinished:
+        unfinished.write_text("".join(lines), "ascii")

@@ -1,6 +1,5 @@
 """From the command line's options to a run that only has to be started."""
 
-import gc
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,31 +8,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
-from scalpel_sim.cli.console import compiling
-from scalpel_sim.cli.options import (
-    SERVER_PATIENCE,
-    ArmOptions,
-    ClientOptions,
-    MaterialOptions,
-    OutputOptions,
-    PrintOptions,
-    TissueOptions,
-    given_options,
-)
+from scalpel_sim.cli.options import ArmOptions, MaterialOptions, TissueOptions, given_options
 from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
 from scalpel_sim.cli.steps_of_frames import check_steps_of_frames
 from scalpel_sim.errors import Interrupted, UsageError
-from scalpel_sim.output.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.output.export import check_exports
-from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
+from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
+from scalpel_sim.runs.options import SERVER_PATIENCE, ClientOptions, OutputOptions, PrintOptions
+from scalpel_sim.runs.prepared_run import PreparedRun, load_kernels
+from scalpel_sim.runs.run_folder import check_folder
 from scalpel_sim.scene_body import check_scene, make_tissue
 from scalpel_sim.scene_parts.scene import LONGEST_RUN, Scene, changed
 from scalpel_sim.scenes import scene_of
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.stop_signals import loading
 from scalpel_sim.tables.toml import is_toml_file
-from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -65,19 +54,6 @@ class RunOptions(NamedTuple):
     client: ClientOptions
     output: OutputOptions
     printing: PrintOptions
-
-
-class PreparedRun(NamedTuple):
-    """A run that only has to be started."""
-
-    simulation: Simulation
-    scene: Scene
-    """What it was made from. Of a tissue elsewhere it says only what the server describes."""
-    folder: Path
-    settings: dict[str, Any]
-    """What the command line and the scene resolved to."""
-    checkpoint_seconds: float
-    """Simulated time between two checkpoints [s]; 0: there are none."""
 
 
 @contextmanager
@@ -113,7 +89,16 @@ def prepared_run(
     try:
         settings |= {"arm": simulation.arm.name}
         folder, every = _folder(options.output, scene), _checkpoint_seconds(options)
-        yield PreparedRun(simulation, scene, folder, settings, every)
+        yield PreparedRun(
+            simulation,
+            scene,
+            folder,
+            settings,
+            every,
+            options.output.export,
+            options.client.connect is None,
+            options.printing,
+        )
     finally:
         link.close()
 
@@ -216,18 +201,6 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
             "calibration": scene.material.spring_calibration,
         }
     }
-
-
-def load_kernels(options: PrintOptions, scene: Scene | None = None) -> None:
-    """Load the kernels, which ends the loading; show the progress where they are compiled first.
-
-    Args:
-        options: Whether to show it.
-        scene: Whose kernels; None: those of the default scene, with and without an account.
-    """
-    with compiling(options) as on_progress, loading():
-        prepare_kernels(USUAL_SETS if scene is None else [KernelSet.of(scene)], on_progress)
-    gc.enable()
 
 
 def _changes_of_scene(arm: ArmOptions) -> dict[str, Any]:

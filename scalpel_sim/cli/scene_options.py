@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from scalpel_sim.arm.scalpel import expect_faces
 from scalpel_sim.cli.material_file import read_blade, read_material, warn_of_unused_tables
 from scalpel_sim.cli.options import (
     ArmOptions,
@@ -19,6 +18,7 @@ from scalpel_sim.cli.options import (
 )
 from scalpel_sim.cli.prony_series import series_of
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.blade import expect_faces
 from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.layers import merged, with_environment, with_settings
 from scalpel_sim.scene_file.reading import SceneFile, read_scene_file, shipped_scene

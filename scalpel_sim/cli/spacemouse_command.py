@@ -6,10 +6,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from bridge import DEFAULT_DEVICE_PORT, DEFAULT_HOST
-from scalpel_sim.cli.console import log_to_stderr, say
-from scalpel_sim.cli.options import CONNECTION, SERVER_PATIENCE, PrintOptions
 from scalpel_sim.errors import RunError
-from scalpel_sim.stop_signals import loading
+from scalpel_sim.runs.console import log_to_stderr, say
+from scalpel_sim.runs.options import CONNECTION, SERVER_PATIENCE, PrintOptions
+from scalpel_sim.runs.stop_signals import loading
 
 
 def spacemouse(

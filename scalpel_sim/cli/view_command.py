@@ -1,17 +1,23 @@
 """The command `view`: a run that is shown live in a browser, and may be led there."""
 
-from scalpel_sim.cli.console import log_to_stderr
-from scalpel_sim.cli.options import (
-    ArmOptions,
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.runs.console import log_to_stderr
+from scalpel_sim.runs.options import (
     ClientOptions,
     DeviceOptions,
     OutputOptions,
     PageOptions,
     PrintOptions,
-    SceneName,
-    TissueOptions,
 )
-from scalpel_sim.output.plot_process import Plotter
+
+if TYPE_CHECKING:  # an error of use should be printed without waiting for a compiler
+    from scalpel_sim.hands.commands import Begin
+    from scalpel_sim.runs.prepared_run import PreparedRun
 
 
 def view(
@@ -45,14 +51,38 @@ def view(
         scene: What to cut.
     """
     with log_to_stderr(printing), Plotter() as plotter:
-        from scalpel_sim.cli.device_run import check_device_options
-        from scalpel_sim.cli.device_view import view_device
-        from scalpel_sim.cli.live_session import LiveSession
-        from scalpel_sim.cli.run_setup import RunOptions
+        from scalpel_sim.cli.run_setup import RunOptions, prepared_run
+        from scalpel_sim.runs.device_run import check_device_options, view_device
+        from scalpel_sim.runs.live_session import LiveSession
 
         options = RunOptions(tissue, arm, client, output, printing)
-        if page.hand == "device":
-            return view_device(scene, options, page, device, plotter)
-        check_device_options(device, is_led=False)
-        with LiveSession(scene, options, page, plotter) as session:
+        is_led = page.hand == "device"
+        check_device_options(device, is_led=is_led)
+        if is_led:
+            with prepared_run(scene, options, relaxation="verlet", is_led=True) as prepared:
+                return view_device(prepared, page, device, plotter)
+
+        def prepare(asked: "Begin") -> AbstractContextManager["PreparedRun"]:
+            return prepared_run(
+                asked.scene or scene,
+                options._replace(tissue=_changed(tissue, asked)),
+                relaxation="verlet",
+                is_led=asked.is_led,
+            )
+
+        with LiveSession(prepare, page, plotter) as session:
             session.perform()
+
+
+def _changed(tissue: TissueOptions, asked: "Begin") -> TissueOptions:
+    """Return the options of a run: those of the command line, and the choices in the page."""
+    if asked.scene:  # what the command line says of the body is about another scene
+        tissue = TissueOptions(solver=tissue.solver)
+    material, blade = tissue.material, tissue.blade
+    if asked.material is not None:
+        material = replace(material, material=asked.material)
+    if asked.toughness is not None:
+        material = replace(material, toughness=asked.toughness)
+    if asked.blade_thickness is not None:
+        blade = replace(blade, blade_thickness=asked.blade_thickness)
+    return replace(tissue, material=material, blade=blade)

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from scalpel_sim.cli.console import compiling, log_to_stderr
-from scalpel_sim.cli.options import PrintOptions, TissueOptions
+from scalpel_sim.cli.options import TissueOptions
 from scalpel_sim.errors import RunError
+from scalpel_sim.runs.console import compiling, log_to_stderr
+from scalpel_sim.runs.options import PrintOptions
 
 if TYPE_CHECKING:  # `--help` should not wait for a compiler
-    from scalpel_sim.warm_up import KernelSet
+    from scalpel_sim.runs.warm_up import KernelSet
 
 _BYTES_PER_MB = 1e6
 
@@ -36,8 +37,8 @@ def warm_up(
         scenes: organ, incision, slab, grid2, grid7, or all [default: organ].
     """
     with log_to_stderr(printing):
+        from scalpel_sim.runs.warm_up import compile_ahead, kernels_are_compiled
         from scalpel_sim.scenes import SCENES
-        from scalpel_sim.warm_up import compile_ahead, kernels_are_compiled
 
         every = "all" in scenes
         chosen: Sequence[str | None] = list(SCENES) if every else scenes or (None,)
@@ -59,8 +60,8 @@ def _sets(names: Sequence[str | None], tissue: TissueOptions) -> list["KernelSet
         UsageError: there is no such scene, or options that make no sense together.
     """
     from scalpel_sim.cli.scene_options import chosen_scene
+    from scalpel_sim.runs.warm_up import KernelSet
     from scalpel_sim.scene_parts.choices import can_audit
-    from scalpel_sim.warm_up import KernelSet
 
     found: dict[KernelSet, None] = {}
     for name in names:

@@ -2,12 +2,17 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from scalpel_sim.cli.console import log_to_stderr, say
-from scalpel_sim.cli.options import OUTPUT, FigureNumber, PrintOptions
+from scalpel_sim.runs.console import log_to_stderr, say
+from scalpel_sim.runs.options import OUTPUT, PrintOptions
+
+FigureNumber = Annotated[
+    Literal[10, 11, 12, "organ", "retract", "excise", "taut_incision"],
+    Parameter(help="10, 11, 12, organ, retract, excise or taut_incision."),
+]
 
 
 def figure(
@@ -43,10 +48,10 @@ def figure(
     with log_to_stderr(printing):
         check_scheme(scheme)
         check_file(path, ".png", "--output")
-        from scalpel_sim.cli.run_setup import load_kernels
         from scalpel_sim.figures.figures import draw_figure
         from scalpel_sim.figures.organ import draw_organ
         from scalpel_sim.figures.two_hands import draw_two_hands
+        from scalpel_sim.runs.prepared_run import load_kernels
 
         load_kernels(printing)
         if not printing.quiet:

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scalpel_sim.planned_cut import PlannedCut, prepare_cut
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.cuts import PlannedCut, prepare_cut
 from scalpel_sim.viewer.model_shapes import Shape, body_poses, shapes_of
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Snapshot, Surface

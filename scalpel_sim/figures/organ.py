@@ -8,8 +8,8 @@ from PIL import Image
 
 from scalpel_sim.figures.cuts import moments, with_scheme
 from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, figure_file, picture, view_of
+from scalpel_sim.planned_cut import PlannedCut
 from scalpel_sim.scenes import SCENES
-from scalpel_sim.strokes.cuts import PlannedCut
 
 ORGAN = PlannedCut(
     replace(SCENES["organ"], stretch=0.15, table=None),

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple, Protocol
 
 from bridge import InProcessLink
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.state.simulation_state import SimulationState
+from scalpel_sim.state import SimulationState
 
 MOST_STROKES = 50
 """Strokes that can be undone. Each keeps a state of the body in memory, some megabytes."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.arm.hand import Hand
-from scalpel_sim.arm.stroke_follower import StrokeFollower
+from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.strokes.stroke import Stroke, poses_of_edges
 from tissue import BladeSegment, FloatArray
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.arm.led_grasper import Hold
+from scalpel_sim.instruments.led_grasper import Hold
 from scalpel_sim.output.cut_account import (
     MOST,
     Stretch,

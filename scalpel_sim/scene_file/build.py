@@ -6,8 +6,8 @@ from typing import Any
 
 import msgspec
 
-from scalpel_sim.arm.scalpel import SCALPEL, chosen_blade
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.blade import SCALPEL, chosen_blade
 from scalpel_sim.scene_file.reading import SceneFile
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import DEFAULT_CUT_SETTINGS, GEL, Scene

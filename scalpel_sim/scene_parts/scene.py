@@ -9,8 +9,8 @@ import numpy as np
 from msgspec import structs
 
 from bridge import MAX_FRAMES_PER_ANSWER, VirtualCoupling
-from scalpel_sim.arm.scalpel import SCALPEL
 from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene_parts.choices import (
     ARM_CHOICES,
     COUPLINGS,

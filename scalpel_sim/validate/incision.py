@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.preparation import prepare
-from scalpel_sim.run import REST_AFTER_STROKE
+from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import asked_area

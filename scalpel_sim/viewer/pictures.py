@@ -89,6 +89,28 @@ def show_in(viewer: Viewer, simulation: Simulation, live: LiveState | None = Non
     )
 
 
+def show_run(viewer: Viewer, simulation: Simulation, controls: RunControls) -> Callable[[], None]:
+    """Show a run in a live viewer now, after each frame, and after each change by the page.
+
+    Args:
+        viewer: Its page controls the run.
+        simulation: The run, at its start.
+        controls: Obey that page.
+
+    Returns:
+        A function that shows the run as it then is.
+    """
+
+    def show() -> None:
+        show_in(viewer, simulation, live_state(controls))
+
+    show()
+    controls.on_change = show
+    controls.on_wait = lambda: show() if viewer.lacks_values else None
+    simulation.pictures.append(into_viewer(viewer, lambda: live_state(controls)))
+    return show
+
+
 def values_in(
     simulation: Simulation, quantities: Iterable[SurfaceQuantity]
 ) -> dict[SurfaceQuantity, FloatArray]:

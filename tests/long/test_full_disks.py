@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.output.run_folder import RUN_FILES
+from scalpel_sim.runs.file_names import RUN_FILES
 from tests.battery import battery
 from tests.run_files import names_in
 from tests.small_disk import run_on_a_small_disk

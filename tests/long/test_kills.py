@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES
 from scalpel_sim.recording.recording import read_forces
+from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES
 from tests.battery import battery
 from tests.long.forked_runs import ForkedRuns, count_in
 from tests.processes import start

@@ -13,8 +13,8 @@ import time
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.run_folder import RUN_FILES, STROKE
 from scalpel_sim.recording.recording import read_forces
+from scalpel_sim.runs.file_names import RUN_FILES, STROKE
 from tests.processes import PROGRAM, environment, start, wait_for_rows, wait_until_heard
 from tests.run_files import names_in
 from tests.small_disk import run_on_a_small_disk
@@ -77,7 +77,7 @@ def test_what_a_signal_interrupts_is_not_taken_down():
     """llvmlite frees twice what it is freeing just then."""
     code = """if True:
         import os, time
-        from scalpel_sim.stop_signals import SIGNALS, interrupt_on_signals, loading
+        from scalpel_sim.runs.stop_signals import SIGNALS, interrupt_on_signals, loading
 
         class Owner:
             def __del__(self):
@@ -169,7 +169,7 @@ def test_what_a_hand_did_is_kept_when_the_disk_takes_it_later(tmp_path):
         "import resource, sys\n"
         "from pathlib import Path\n"
         "from scalpel_sim.output.plot_process import Plotter\n"
-        "from scalpel_sim.output.run_folder import Outputs\n"
+        "from scalpel_sim.runs.run_folder import Outputs\n"
         "from scalpel_sim.errors import RunError\n"
         "with Plotter() as plotter, Outputs(Path(sys.argv[1]), plotter) as outputs:\n"
         "    rows = [[float(i)] * 13 for i in range(100)]\n"

@@ -11,9 +11,10 @@ from scalpel_sim.cli.options import BodyOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES, SCENE, Outputs
 from scalpel_sim.recording.recording import COLUMNS, read_forces
-from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
+from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES, SCENE
+from scalpel_sim.runs.run import REST_AFTER_STROKE, perform, run_time
+from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
 from scalpel_sim.scene_parts.scene import GEL, changed
 from scalpel_sim.scenes import DEFAULT_SCENE, scene_called, scene_of

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.run_folder import ENERGY_PLOT, FRAMES_PER_FLUSH, RUN_FILES
 from scalpel_sim.recording.recording import read_forces
+from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES
+from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH
 from tests.processes import start, wait_for_rows
 from tests.run_files import names_in
 from tissue import MATERIALS

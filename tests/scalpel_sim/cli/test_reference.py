@@ -11,13 +11,11 @@ from scalpel_sim.cli.options import (
     ArmOptions,
     BladeOptions,
     BodyOptions,
-    ClientOptions,
     MaterialOptions,
-    PrintOptions,
-    RunOutputOptions,
     SolverOptions,
 )
 from scalpel_sim.cli.reference import command_line_reference
+from scalpel_sim.runs.options import ClientOptions, PrintOptions, RunOutputOptions
 
 pytestmark = pytest.mark.skipif(
     int(version("cyclopts").partition(".")[0]) != 5,

@@ -9,7 +9,7 @@ from bridge import InProcessLink
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.cli.steps_of_frames import check_steps_of_frames
 from scalpel_sim.errors import UsageError
-from scalpel_sim.output.run_folder import FORCES, SUMMARY
+from scalpel_sim.runs.file_names import FORCES, SUMMARY
 from tissue import Material, Tissue, block
 
 STIFF = ["--young", "1e10", "--toughness", "2e7"]

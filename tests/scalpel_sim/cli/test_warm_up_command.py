@@ -5,10 +5,10 @@ import json
 
 import pytest
 
-from scalpel_sim.cli import console
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.cli.options import PrintOptions
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
+from scalpel_sim.runs import console
+from scalpel_sim.runs.options import PrintOptions
 from tissue import cache_directory, n_compiled_kernels
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from bridge import DeviceClient, LinkError
 from scalpel_sim import prepare
-from scalpel_sim.cli.device_run import DeviceRun, device_run
-from scalpel_sim.cli.options import DeviceOptions
-from scalpel_sim.cli.run_setup import PreparedRun
+from scalpel_sim.runs.device_run import DeviceRun, device_run
+from scalpel_sim.runs.options import DeviceOptions
+from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.scene_parts.scene import changed
 from tests.scalpel_sim.hands.led_runs import GRID2
 

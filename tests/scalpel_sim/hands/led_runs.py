@@ -12,8 +12,8 @@ from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.pace import Pace
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import Outputs
-from scalpel_sim.run import perform
+from scalpel_sim.runs.run import perform
+from scalpel_sim.runs.run_folder import Outputs
 
 GRID2 = SCENES["grid2"]
 

@@ -13,8 +13,8 @@ import pytest
 from bridge import DeviceClient, LinkError, write_new_key
 from bridge.tcp.keys import read_key
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.runs.file_names import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from tests.scalpel_sim.hands.device_runs import lead_forwards
 
 pytestmark = pytest.mark.end_to_end

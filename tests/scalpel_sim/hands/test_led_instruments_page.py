@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.output.run_folder import FORCES
 from scalpel_sim.recording.recording import read_forces
+from scalpel_sim.runs.file_names import FORCES
 from tests.browser import TIMEOUT, WINDOW
 from tests.scalpel_sim.hands.led_view import LedView
 from tests.scalpel_sim.hands.test_led_page import (

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.runs.file_names import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from tests.browser import new_tab
 from tests.scalpel_sim.hands.led_view import LedView
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.run_folder import FINAL, FORCES, STROKE, SUMMARY
 from scalpel_sim.recording.recording import COLUMNS, read_forces
-from scalpel_sim.run import REST_AFTER_STROKE
+from scalpel_sim.runs.file_names import FINAL, FORCES, STROKE, SUMMARY
+from scalpel_sim.runs.run import REST_AFTER_STROKE
 from tests.scalpel_sim.hands.led_view import LedView, page_of, token_in
 
 pytestmark = pytest.mark.end_to_end

@@ -13,9 +13,10 @@ from scalpel_sim.hands.limited_pose import MOST_SPEED
 from scalpel_sim.hands.live_grasper import JAW_SPEED
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import FINAL, SCENE, STROKE, Outputs, grasp_file
 from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.run import REST_AFTER_STROKE, perform
+from scalpel_sim.runs.file_names import FINAL, SCENE, STROKE, grasp_file
+from scalpel_sim.runs.run import REST_AFTER_STROKE, perform
+from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
 from tests.scalpel_sim.hands.led_runs import PERIOD, Clock, controls_of, led, move, turn

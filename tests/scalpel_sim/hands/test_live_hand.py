@@ -13,11 +13,12 @@ from scalpel_sim.hands.limited_pose import (
     MOST_TURN_RATE,
 )
 from scalpel_sim.hands.live_hand import LiveHand
-from scalpel_sim.hands.workspace import ROOM
+from scalpel_sim.instruments.workspace import ROOM
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import FINAL, STROKE, Outputs
 from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.run import REST_AFTER_STROKE
+from scalpel_sim.runs.file_names import FINAL, STROKE
+from scalpel_sim.runs.run import REST_AFTER_STROKE
+from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
 from tests.scalpel_sim.hands.led_runs import (

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from scalpel_sim import read_scene
-from scalpel_sim.output.run_folder import SCENE, STROKE, SUMMARY
+from scalpel_sim.runs.file_names import SCENE, STROKE, SUMMARY
 from tests.scalpel_sim.hands.led_view import LedView, LiveView, document, page_of, token_in
 from tissue import MATERIALS
 

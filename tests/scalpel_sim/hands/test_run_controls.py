@@ -6,8 +6,8 @@ import pytest
 from scalpel_sim import prepare
 from scalpel_sim.hands.commands import End, Engage, Pause, Release, Reset, Resume, Step, Undo
 from scalpel_sim.hands.run_controls import FRAMES_PER_STEP
-from scalpel_sim.output.run_folder import FINAL, FORCES, REPLAY, STROKE, SUMMARY
 from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.runs.file_names import FINAL, FORCES, REPLAY, STROKE, SUMMARY
 from scalpel_sim.scene_parts.scene import changed
 from tests.scalpel_sim.hands.led_runs import GRID2, controls_of, done, led, move
 

@@ -9,20 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scalpel_sim.cli.options import (
-    ArmOptions,
-    ClientOptions,
-    PrintOptions,
-    RunOutputOptions,
-    TissueOptions,
-)
+from scalpel_sim.cli.options import ArmOptions, TissueOptions
 from scalpel_sim.cli.resumed_run import perform_resumed
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
-from scalpel_sim.cli.scripted_run import perform_script
-from scalpel_sim.output.checkpoints import CHECKPOINT_FILES, Checkpoints
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.state.checkpoint import read_checkpoint
+from scalpel_sim.runs.checkpoint import read_checkpoint
+from scalpel_sim.runs.checkpoints import Checkpoints
+from scalpel_sim.runs.file_names import CHECKPOINT_FILES
+from scalpel_sim.runs.options import ClientOptions, PrintOptions, RunOutputOptions
+from scalpel_sim.runs.prepared_run import perform_script
 from tests.scalpel_sim.output.killed_runs import Killed, at
 
 AGAIN = RunOptions(
@@ -40,7 +36,7 @@ def run_in(folder, n_frames=None, **arm):
     output = replace(AGAIN.output, out=folder)
     asked = AGAIN._replace(arm=ArmOptions(seconds=0.25, **arm), output=output)
     with Plotter() as plotter, prepared_run("grid2", asked, audits=True) as prepared:
-        perform_script(prepared, asked, plotter, at(n_frames))
+        perform_script(prepared, plotter, at(n_frames))
 
 
 def killed_in(folder):

@@ -9,10 +9,10 @@ import pytest
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.resumption import resumption_of
-from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.recording.recording import WALL_TIMES, read_forces
-from scalpel_sim.run import perform
+from scalpel_sim.runs.resumption import resumption_of
+from scalpel_sim.runs.run import perform
+from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scenes import read_scene
 from tests.scalpel_sim.hands.led_runs import controls_of, through_the_body
 

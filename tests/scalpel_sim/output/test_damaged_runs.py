@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.output.checkpoints import CHECKPOINT_FILES
-from scalpel_sim.output.resumption import CHANGED_SCENE, resumption_of
-from scalpel_sim.output.run_folder import (
+from scalpel_sim.runs.checkpoint import read_checkpoint
+from scalpel_sim.runs.file_names import (
+    CHECKPOINT_FILES,
     FINAL,
     FORCES,
     INITIAL,
@@ -17,9 +17,9 @@ from scalpel_sim.output.run_folder import (
     REPLAY_FRAMES,
     SCENE,
     STROKE,
-    Outputs,
 )
-from scalpel_sim.state.checkpoint import read_checkpoint
+from scalpel_sim.runs.resumption import CHANGED_SCENE, resumption_of
+from scalpel_sim.runs.run_folder import Outputs
 from tests.scalpel_sim.output.damaged_runs import (
     change,
     checkpoints,

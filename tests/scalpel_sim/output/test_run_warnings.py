@@ -13,7 +13,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.run_outcome import outcome_of
 from scalpel_sim.output.run_warnings import warnings_of
 from scalpel_sim.recording.recording import COLUMNS, Recording, columns_of_hand
-from scalpel_sim.run import run_time
+from scalpel_sim.runs.run import run_time
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import Stroke
 from tests.scalpel_sim.served_scenes import served

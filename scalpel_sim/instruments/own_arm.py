@@ -1,0 +1,231 @@
+"""An arm of the user's own: any MJCF with a blade, led by a hand at its edge.
+
+The hand is Cartesian impedance control at the blade, with gravity compensated, as robot arms offer
+it: it acts through the joints, whatever they are. The model's own actuators are taken out, for they
+would hold the joints where they are.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from bridge import DeviceLimits, TissueFrame
+from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
+from scalpel_sim.arm.hand import Impedance
+from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.placement import PlacementError
+from scalpel_sim.arm.reachable_box import (
+    SMALLEST_SHARE,
+    grown_within,
+    placed_within,
+    shrunk,
+    tour_of,
+)
+from scalpel_sim.arm.standing import Standing
+from scalpel_sim.errors import UsageError
+from scalpel_sim.instruments.lacking_reach import PlaceInScene, place_of_tissue, what_it_lacks
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import BladeSegment, FloatArray
+
+_USUAL_MASS, _USUAL_MOMENT = 0.07, 0.07 * 0.08**2
+"""Mass [kg] and moment of inertia [kg m2] that the usual hand feels; see `Impedance`."""
+_LEAST_MOBILITY: Final = 1e-9
+"""Mobility below which an edge does not move [1/kg or 1/(kg m2)]: that is rounding."""
+_SAMPLES: Final = 33
+"""Poses along the stroke that the arm must reach."""
+
+
+def own_arm(
+    path: Path,
+    limits: DeviceLimits,
+    *,
+    heel: str = "heel",
+    tip: str = "tip",
+    forward: Sequence[float] = (0.0, 0.0, -1.0),
+    others: Sequence[Standing] = (),
+) -> LedArm:
+    """Return the arm of an MJCF file, in the configuration of its first keyframe if it has one.
+
+    Args:
+        path: The file. It needs two sites at the ends of the edge, on one body.
+        limits: Largest force and torque that the arm can render.
+        heel: Site at the handle's end of the edge.
+        tip: Site at the sharp end.
+        forward: Direction in which the edge cuts, in the frame of its body.
+        others: What else stands in its world: arms, each with a grasper, a table, fixtures.
+
+    Raises:
+        UsageError: the file cannot be read, is no model, or has no such blade.
+    """
+    led = partial(LedArm, heel=heel, tip=tip, forward=forward)
+    try:
+        usual = led(own_spec(path), path.stem, limits)
+        expect_angles(usual.model)
+        usual.reset(_at_first(usual))
+        firm = firm_impedance(usual)
+        arm = led(own_spec(path), path.stem, limits, firm, others=others)
+    except ValueError as error:
+        raise UsageError(f"[arm] model {path}: {error}") from error
+    arm.reset(_at_first(usual))
+    return arm
+
+
+def own_spec(path: Path) -> mujoco.MjSpec:
+    """Return the model of a file without its actuators, its gravity compensated.
+
+    What measures an actuator goes with it.
+
+    Raises:
+        ValueError: the file cannot be read, or is no model.
+    """
+    spec = mujoco.MjSpec.from_file(str(path))
+    for sensor in list(spec.sensors):
+        if mujoco.mjtObj.mjOBJ_ACTUATOR in (sensor.objtype, sensor.reftype):
+            spec.delete(sensor)
+    for actuator in list(spec.actuators):
+        spec.delete(actuator)
+    for key in list(spec.keys):
+        key.ctrl, key.act = [], []  # of the actuators that are gone
+    for body in spec.bodies:
+        body.gravcomp = 1.0
+    # A bad state must raise, not jump back to the start.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return spec
+
+
+def expect_angles(model: mujoco.MjModel) -> None:
+    """Refuse joints whose position is not one number.
+
+    Raises:
+        ValueError: one is no hinge and no slide.
+    """
+    others = {int(mujoco.mjtJoint.mjJNT_BALL): "ball", int(mujoco.mjtJoint.mjJNT_FREE): "free"}
+    found = [
+        f"'{model.joint(i).name}' of body '{model.body(int(model.jnt_bodyid[i])).name}' ({word})"
+        for i in range(model.njnt)
+        if (word := others.get(int(model.jnt_type[i])))
+    ]
+    if found:
+        raise ValueError(
+            f"it has other joints than hinges and slides: {', '.join(found)}. Three hinges make a "
+            "ball; what is loose cannot be part of an arm"
+        )
+
+
+def _at_first(arm: LedArm) -> FloatArray:
+    """Return the configuration of the first keyframe, or that of the model without one."""
+    first = arm.model.key_qpos[0] if arm.model.nkey else arm.model.qpos0
+    return np.asarray(np.clip(first, *arm.ranges()))
+
+
+def firm_impedance(arm: LedArm) -> Impedance:
+    """Return a hand that moves this arm as fast as the usual one moves the arms of the scenes.
+
+    A robot is a hundred times as heavy at its edge: the usual hand would leave it swinging at 5 Hz.
+    Stiffness and damping follow its inertia there (Khatib 1987, IEEE J. Robotics and Automation
+    3:43), and are critical.
+
+    Args:
+        arm: The arm, alone in its model, in a configuration in which it will work.
+    """
+    model, data = arm.model, arm.data
+    position, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jacSite(model, data, position, rotation, arm.hand.edge)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    mass, moment = (_felt(jacobian, inertia) for jacobian in (position, rotation))
+    usual = Impedance()
+    rate = math.sqrt(usual.stiffness / _USUAL_MASS)
+    turning = math.sqrt(usual.rotational_stiffness / _USUAL_MOMENT)
+    return Impedance(
+        max(usual.stiffness, mass * rate**2),
+        max(usual.damping, 2.0 * mass * rate),
+        max(usual.rotational_stiffness, moment * turning**2),
+        max(usual.rotational_damping, 2.0 * moment * turning),
+    )
+
+
+def _felt(jacobian: FloatArray, inertia: FloatArray) -> float:
+    """Return the largest inertia that is felt at the edge [kg or kg m2], where the arm is free.
+
+    It is 0 where no joint moves it at all: slides do not turn it.
+    """
+    mobility = np.linalg.eigvalsh(jacobian @ np.linalg.solve(inertia, jacobian.T))
+    free = mobility[mobility > max(1e-6 * mobility.max(), _LEAST_MOBILITY)]
+    return float(1.0 / free.min()) if len(free) else 0.0
+
+
+def move_to_start(
+    arm: LedArm, stroke: Stroke, frame: TissueFrame, place: PlaceInScene | None = None
+) -> None:
+    """Move an arm to the start of a stroke, all of which it must reach.
+
+    Args:
+        arm: The arm; the configuration where it is is tried first.
+        stroke: In the tissue frame.
+        frame: Where the tissue lies in the world.
+        place: How the scene says so; None: as `frame` does.
+
+    Raises:
+        PlacementError: it does not; the message says by how much and in which direction, and where
+            it would, or which motion the arm lacks.
+    """
+    times, poses = _watched(stroke, frame)
+    solver = DampedLeastSquares(arm)
+    found = solver.find(poses)
+    if not found.is_whole:
+        lacks = what_it_lacks(solver, times, poses, place or place_of_tissue(frame))
+        raise PlacementError(f"the arm '{arm.name}' does not reach the stroke: {lacks}")
+    arm.reset(found.first)
+
+
+def move_within(
+    arm: LedArm,
+    workspace: FloatArray,
+    start: BladeSegment,
+    frame: TissueFrame,
+    place: PlaceInScene | None = None,
+) -> FloatArray:
+    """Move an arm to a pose, and return how much of the workspace around it it reaches.
+
+    Args:
+        arm: See `move_to_start`.
+        workspace: Lowest and highest place where the middle of the edge is wanted, tissue frame
+            [m], shape (2, 3).
+        start: The pose, tissue frame.
+        frame: Where the tissue lies in the world.
+        place: See `move_to_start`.
+
+    Raises:
+        PlacementError: it does not reach even a small part of it.
+    """
+    middle = 0.5 * (start.tip + start.heel)
+
+    def move_for(shares: FloatArray) -> FloatArray:
+        box = shrunk(workspace, middle, shares)
+        tour = tour_of(box, middle, start)
+        found = DampedLeastSquares(arm).find(_watched(tour, frame)[1])
+        if not found.is_whole:
+            if shares.max() <= SMALLEST_SHARE:  # the last that is tried: say what it lacks
+                move_to_start(arm, tour, frame, place)
+            raise PlacementError(f"the arm '{arm.name}' does not reach the stroke")
+        arm.reset(found.first)
+        return box
+
+    def reaches(box: FloatArray) -> bool:
+        poses = _watched(tour_of(box, middle, start), frame)[1]
+        solver = DampedLeastSquares(arm)
+        return solver.follow(solver.starts()[0], poses).is_whole
+
+    return grown_within(placed_within(move_for), workspace, reaches)
+
+
+def _watched(stroke: Stroke, frame: TissueFrame) -> tuple[FloatArray, list[BladeSegment]]:
+    """Return the instants at which an arm must reach a stroke [s], and the poses, world frame."""
+    times = np.linspace(0.0, stroke.duration, _SAMPLES)
+    return times, [frame.segment_to_world(stroke.pose(t)) for t in times]

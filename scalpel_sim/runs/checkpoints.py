@@ -1,0 +1,148 @@
+"""`Checkpoints`: the checkpoints of a run, which a thread writes beside the frame loop."""
+
+import logging
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Self
+
+from scalpel_sim.runs.checkpoint import Checkpoint, read_checkpoint
+from scalpel_sim.runs.file_names import CHECKPOINT_FILES
+from tissue import StateError, whole_file
+
+CHECKPOINT_SECONDS = 1.0
+"""Simulated time between two checkpoints, where nothing is said of it [s]."""
+
+_log = logging.getLogger(__name__)
+
+
+class Checkpoints:
+    """Writes a checkpoint every so many frames, and keeps the last two.
+
+    While one is written, no other is due. Where the system refuses, that is logged once, the run
+    goes on, and the last whole checkpoint stays.
+
+    Args:
+        folder: Where the files are, and those of an earlier run that goes on.
+        every: Frames between two; 0: there are none.
+        grown: Names of files that grow with the run: they are on the disk before a checkpoint is.
+    """
+
+    def __init__(self, folder: Path, every: int = 0, grown: Sequence[str] = ()) -> None:
+        self._folder, self._every, self._grown = folder, every, tuple(grown)
+        self._frames: list[int | None] = [None, None]
+        self._due = 0
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="checkpoint")
+        self._written: Future[None] | None = None
+        self._has_failed = False
+
+    def read(self, *, is_said: bool = False) -> list[Checkpoint]:
+        """Return the whole checkpoints of a run that goes on, the last one first.
+
+        Args:
+            is_said: Whether those that are not whole have been logged; else they are.
+        """
+        found = []
+        for slot, name in enumerate(CHECKPOINT_FILES):
+            try:
+                checkpoint = read_checkpoint(self._folder / name)
+            except (StateError, OSError) as error:
+                if not is_said:
+                    _log.warning("%s; it is left out", error)
+                continue
+            if checkpoint is not None:
+                self._frames[slot] = checkpoint.head.mark.n_frames
+                found.append(checkpoint)
+        return sorted(found, key=lambda each: -each.head.mark.n_frames)
+
+    def go_on_from(self, n_frames: int) -> None:
+        """Go on after so many frames: the checkpoints of more, which were undone, are removed."""
+        self._remove_after(n_frames)
+        self._due = n_frames + (self._every if n_frames in self._frames else 0)
+
+    @property
+    def are_wanted(self) -> bool:
+        """Whether there are to be any."""
+        return self._every > 0
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there is one."""
+        return self._frames != [None, None]
+
+    def is_due(self, n_frames: int) -> bool:
+        """Return whether a checkpoint is to be written after so many frames."""
+        is_free = self._written is None or self._written.done()
+        return self.are_wanted and is_free and n_frames >= self._due
+
+    def write(self, make: Callable[[], Checkpoint]) -> None:
+        """Write a checkpoint, once the one before is written.
+
+        Args:
+            make: Makes it, before this returns.
+        """
+        self.finish()
+        checkpoint = make()
+        n_frames = checkpoint.head.mark.n_frames
+        slot = min((0, 1), key=lambda each: -1 if (n := self._frames[each]) is None else n)
+        self._frames[slot], self._due = n_frames, n_frames + self._every
+        self._written = self._thread.submit(self._write, slot, checkpoint)
+
+    def finish(self) -> None:
+        """Wait until what is to be written is on the disk."""
+        written, self._written = self._written, None
+        if written is not None:
+            written.result()
+
+    def close(self) -> None:
+        """End the thread, when it has written. May be called twice."""
+        self._thread.shutdown()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def remove(self) -> None:
+        """Remove all checkpoints."""
+        self._remove_after(-1)
+
+    def _remove_after(self, n_frames: int) -> None:
+        """Remove the checkpoints of more frames."""
+        self.finish()
+        for slot, name in enumerate(CHECKPOINT_FILES):
+            n = self._frames[slot]
+            if n_frames < 0 or (n is not None and n > n_frames):
+                self._frames[slot] = None
+                (self._folder / name).unlink(missing_ok=True)
+
+    def _write(self, slot: int, checkpoint: Checkpoint) -> None:
+        """Write a checkpoint aside, and put it in its place when it is on the disk."""
+        try:
+            for name in self._grown:
+                _put_on_disk(self._folder / name)
+            with whole_file(self._folder / CHECKPOINT_FILES[slot]) as unfinished:
+                unfinished.write_bytes(checkpoint.to_bytes())
+            _put_on_disk(self._folder)
+        except OSError as error:
+            if not self._has_failed:
+                _log.warning(
+                    "%s: a checkpoint cannot be written (%s); the run goes on, and the last one "
+                    "that was written stays",
+                    self._folder,
+                    error.strerror or error,
+                )
+            self._has_failed = True
+
+
+def _put_on_disk(path: Path) -> None:
+    """Have the system write what a file, or the names in a folder, hold by now."""
+    if not path.exists():
+        return
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

@@ -1,0 +1,321 @@
+"""One run, from a simulation at its start to a folder of files, however it ends."""
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from msgspec import structs
+
+from bridge import LinkError, TcpLink
+from scalpel_sim.errors import Interrupted, RunError, one_line
+from scalpel_sim.hands.led_hand import LedHand
+from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.output.summary import COMPLETE, Summary
+from scalpel_sim.recording.file_sum import FileSum, sum_of
+from scalpel_sim.runs.file_names import INITIAL, SCENE, STROKE, grasp_file
+from scalpel_sim.runs.resumption import RepeatedFrames
+from scalpel_sim.runs.run_checkpoints import RunCheckpoints
+from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_end, write_led
+from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.runs.run_notes import RunPlan
+from scalpel_sim.runs.stop_signals import StopSignals
+from scalpel_sim.scene_file.writing import relative_path, scene_text
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.tables.stroke import StrokeTable
+from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.viewer.pictures import into_replay
+from scalpel_sim.viewer.replay import ReplayWriter
+
+_log = logging.getLogger(__name__)
+
+REST_AFTER_STROKE = 0.3
+"""How long a run continues after the stroke's end [s]: the tissue swings out, and the cut gapes."""
+
+ENDED_IN_PAGE = "ended in the page"
+"""The status of a run of a script that somebody has ended in the live page."""
+
+LONGEST_WAIT = 2.0
+"""How long a run that is to end waits for a tissue in another process [s]."""
+
+
+def perform(
+    simulation: Simulation,
+    outputs: Outputs,
+    *,
+    settings: dict[str, Any],
+    scene: Scene | None = None,
+    views: Sequence[ViewTable] = (),
+    seconds: float | None = None,
+    every_frame: Callable[[Simulation], None] | None = None,
+    controls: RunControls | None = None,
+) -> Summary:
+    """Do the run, and write its files.
+
+    A run that ends early, by the user, the system or an error, leaves the files of the part that
+    was done, and its summary's `status` says what ended it.
+
+    Args:
+        simulation: At its start.
+        outputs: The folder of the files.
+        settings: Settings to keep in the summary.
+        scene: What `scene.toml` is to hold, if its body is in a table; None: no such file.
+        views: Cameras that the replay offers; it begins with the first.
+        seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
+        every_frame: Called after each frame.
+        controls: What a page asks of the run. If it has a hand, that leads blade and graspers; what
+            it does is written, as `stroke.csv` and a file for each grasper, and the run ends with a
+            rest after the hand has ended.
+
+    Raises:
+        StateError: a run that goes on is made otherwise than it was.
+        Interrupted: the user or the system ended the run.
+        RunError: the run failed, or a file could not be written. The other files are.
+    """
+    plan = None if outputs.resumption is None else outputs.resumption.plan
+    if plan is not None:
+        settings = plan.settings
+    seconds = run_time(simulation, seconds)
+    hand = None if controls is None else controls.hand
+    simulation.recording.keep_in(outputs.folder)
+    with outputs, StopSignals() as stop, outputs.replay_log() as log:
+        replay = ReplayWriter(
+            simulation.arm.model,
+            title=simulation.title,
+            frame=simulation.frame,
+            views=views,
+            log=log,
+        )
+        until = None if hand is not None else seconds
+        start = _begin(simulation, outputs, scene, hand, settings, until)
+        simulation.pictures.append(into_replay(replay))
+        with RunCheckpoints(outputs, simulation, replay) as checkpoints:
+            if controls is not None:
+                controls.history.begin(checkpoints, outputs, replay)
+            failure = _run_frames(
+                simulation, outputs, seconds, every_frame, controls, stop, checkpoints
+            )
+        stopped, stop.is_writing = stop.reason, True
+        status = _status_of(stopped, failure, controls)
+        ended = EndedRun(simulation, outputs, replay, hand, start, settings, status, failure)
+        summary, attempts = write_end(ended)
+        is_done = status in (COMPLETE, ENDED_IN_PAGE) and not attempts.unwritten
+        if is_done or not checkpoints.are_there:
+            outputs.remove_passing_files()
+    can_go_on = checkpoints.are_there and not is_done
+    _raise_what_ended_it(
+        stop, stopped, simulation.time, failure, attempts, outputs.folder, can_go_on=can_go_on
+    )
+    return summary
+
+
+def _raise_what_ended_it(
+    stop: StopSignals,
+    stopped: str | None,
+    time: float,
+    failure: Exception | None,
+    attempts: Attempts,
+    folder: Path,
+    *,
+    can_go_on: bool,
+) -> None:
+    """Raise the first error of a run, or the signal that came, if there was one.
+
+    Args:
+        stop: The signals until the last file was written.
+        stopped: The signal that ended the frames.
+        time: Simulated time [s].
+        failure: The error that ended the frames.
+        attempts: Attempts to write the last files.
+        folder: Where they are.
+        can_go_on: Whether `--resume` goes on from there.
+
+    Raises:
+        Interrupted: the user or the system ended the run, or wanted to when it had ended.
+        RunError: the run failed, or a file could not be written.
+    """
+    kept = f"{folder} holds what was done"
+    if attempts.unwritten:
+        kept += f", but not {', '.join(dict.fromkeys(attempts.unwritten))}"
+    further = f"; --resume {folder} goes on from there" if can_go_on else ""
+    if failure is not None:
+        is_of_files = isinstance(failure.__cause__, OSError)  # what diverged would do so again
+        raise RunError(
+            f"after {time:.3f} s: {one_line(failure)}; {kept}{further if is_of_files else ''}"
+        ) from failure
+    if stopped is not None:
+        raise Interrupted(f"{stopped} after {time:.3f} s; {kept}{further}")
+    if attempts.errors:
+        raise RunError(f"{one_line(attempts.errors[0])}; {kept}{further}") from attempts.errors[0]
+    if stop.reason is not None:
+        raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
+
+
+def _begin(
+    simulation: Simulation,
+    outputs: Outputs,
+    scene: Scene | None,
+    hand: LedHand | None,
+    settings: dict[str, Any],
+    seconds: float | None,
+) -> RunStart:
+    """Write what is known before the first frame, and keep space for what comes after the last.
+
+    A run that goes on is put where it was first: what is refused leaves its folder as it is.
+
+    Args:
+        simulation: At its start.
+        outputs: The folder of the files.
+        scene: See `perform`.
+        hand: What leads the blade, or None for a script.
+        settings: Settings to keep in the summary.
+        seconds: How long the run is to last [s]; None: as long as the hand leads.
+
+    Raises:
+        StateError: a run that goes on is made otherwise than it was.
+        RunError: the system refuses, or there is no room for a run.
+    """
+    body, title, at_first = simulation.link.describe(), simulation.title, simulation.link.snapshot()
+    if hand is not None:
+        hand.take_over(simulation)
+    if outputs.resumption is not None:
+        outputs.resumption.load_into(simulation)
+        outputs.write_mesh(INITIAL, at_first)  # its size is that of the space that is kept
+        outputs.keep_reserve()
+        outputs.remove_earlier_files()
+    scene = _scene_to_write(scene, hand, outputs)
+    text = None if scene is None else scene_text(scene, outputs.path(SCENE))
+    if text is not None:
+        outputs.write_scene(text)
+    exports = [str(path.absolute()) for path in outputs.exports]
+    read = {} if scene is None or hand is not None else _sums_of_recorded(scene, outputs)
+    outputs.begin_journal(RunPlan(simulation.dt, text, exports, settings), seconds, read)
+    if outputs.resumption is None:
+        outputs.write_mesh(INITIAL, at_first)
+        outputs.keep_reserve()
+    # What graspers move is elsewhere when the blade comes.
+    asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
+    return RunStart(body, title, at_first, asked)
+
+
+def _run_frames(
+    simulation: Simulation,
+    outputs: Outputs,
+    seconds: float,
+    every_frame: Callable[[Simulation], None] | None,
+    controls: RunControls | None,
+    stop: StopSignals,
+    checkpoints: RunCheckpoints,
+) -> Exception | None:
+    """Do the frames, and return the error that ended them early.
+
+    Args:
+        simulation: At its start, or where it goes on.
+        outputs: The folder of the files.
+        seconds: How long to simulate [s].
+        every_frame: See `perform`, as the next.
+        controls: What a page asks.
+        stop: The signals.
+        checkpoints: Those of the run.
+    """
+    hand = None if controls is None else controls.hand
+    resumption = outputs.resumption
+    repeated = None if resumption is None else RepeatedFrames(resumption, outputs.folder)
+
+    def obey() -> None:
+        while controls is not None and controls.obey() and stop.reason is None:
+            pass
+
+    def write_rows() -> None:
+        if hand is not None:
+            write_led(outputs, hand)  # first: from it the rows can be made again
+        outputs.write_forces(simulation.recording, all_rows=True)
+
+    def after_frame(now: Simulation) -> bool:
+        if repeated is not None:
+            repeated.check(now.recording)
+        is_due = checkpoints.are_due
+        if is_due or outputs.are_rows_due(now.recording):
+            write_rows()
+        if is_due:
+            checkpoints.write()
+        if every_frame is not None:
+            every_frame(now)
+        obey()
+        if hand is not None:
+            return stop.reason is not None or _has_rested(now, hand)
+        return stop.reason is not None or (controls is not None and controls.has_ended)
+
+    def give_up() -> None:
+        if stop.seconds > LONGEST_WAIT:
+            raise LinkError(f"{stop.reason}, and the tissue, in another process, does not answer")
+
+    link = simulation.link
+    try:
+        if isinstance(link, TcpLink):
+            link.while_waiting = give_up
+        obey()
+        if stop.reason is None:
+            if checkpoints.are_due:
+                checkpoints.write()
+            simulation.run(seconds, after_frame)
+        if stop.reason is not None:
+            write_rows()
+            checkpoints.write_last()
+        if isinstance(link, TcpLink):  # what it answers for the last files may be long
+            link.while_waiting = lambda: None
+    except Exception as error:
+        return error
+    except KeyboardInterrupt:  # a frame that hangs, as where the tissue is elsewhere
+        _log.warning("%s in the middle of a frame", stop.reason)
+    return None
+
+
+def _status_of(stopped: str | None, failure: Exception | None, controls: RunControls | None) -> str:
+    """Return how a run ended, for its summary."""
+    if stopped is not None:
+        return stopped
+    if failure is not None:
+        return f"failed: {one_line(failure)}"
+    is_cut_short = controls is not None and controls.hand is None and controls.has_ended
+    return ENDED_IN_PAGE if is_cut_short else COMPLETE
+
+
+def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
+    """Return whether a run has gone on for `REST_AFTER_STROKE` after its hand has ended."""
+    if hand.ended_at is None:
+        return False
+    # The very number of frames of a run that repeats the stroke.
+    n_frames = round((hand.ended_at + REST_AFTER_STROKE) / simulation.dt)
+    return len(simulation.recording) >= n_frames
+
+
+def _scene_to_write(scene: Scene | None, hand: LedHand | None, outputs: Outputs) -> Scene | None:
+    """Return the scene that repeats what will have been done."""
+    if scene is None or hand is None:
+        return scene
+    recorded = StrokeTable(kind="recorded", file=str(outputs.path(STROKE)))
+    graspers = [
+        structs.replace(each, motion=[], recorded=str(outputs.path(grasp_file(each.name))))
+        for each in scene.graspers
+    ]
+    return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
+
+
+def _sums_of_recorded(scene: Scene, outputs: Outputs) -> dict[str, FileSum]:
+    """Return the checksums of the motions that a run repeats, by path seen from its folder.
+
+    No state knows them: that of a run that a hand led is of a stroke which is not recorded yet.
+
+    Raises:
+        OSError: one cannot be read.
+    """
+    return {relative_path(path, outputs.folder): sum_of(path) for path in scene.recorded_files}
+
+
+def run_time(simulation: Simulation, seconds: float | None) -> float:
+    """Return how long to simulate [s]: `seconds`, else all motions and `REST_AFTER_STROKE`."""
+    return simulation.duration + REST_AFTER_STROKE if seconds is None else seconds

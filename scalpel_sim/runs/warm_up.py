@@ -1,0 +1,299 @@
+"""Compiles the kernels that scenes need, in several processes, and loads them.
+
+    python -m scalpel_sim.runs.warm_up motion|cut|all KERNELS...
+
+is one of the processes; each of KERNELS is a `KernelSet` as JSON.
+"""
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge import TissueFrame, compiled_arithmetic
+from scalpel_sim.arm.arm import Arm
+from scalpel_sim.arm.collision_monitor import CollisionMonitor
+from scalpel_sim.instruments.stroke_follower import StrokeFollower
+from scalpel_sim.recording.force_parts import force_parts
+from scalpel_sim.recording.frame_row import FrameRows, WallTimes
+from scalpel_sim.runs.stop_signals import SignalInterrupt, StopSignals
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scenes import PARENCHYMA, PHANTOM
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import (
+    BladeSegment,
+    BladeShape,
+    BladeSweep,
+    Geom,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+    cache_directory,
+    fixed_nodes,
+    is_compiling,
+    n_compiled_kernels,
+)
+
+_SIDE = 0.02
+"""Length of the sides of the block that is cut [m]."""
+N_STEPS = 40
+_DT = 1e-3
+_SECONDS_PER_LOOK = 0.1
+"""How often the progress of the processes is looked at [s]."""
+USUAL_NUMBER = 838
+"""How many kernels a set has, about: the end of the progress bar, unless there are more."""
+
+Progress = Callable[[int, int], None]
+"""Receives how many kernels are compiled, and how many there will be, about."""
+
+
+class KernelSet(NamedTuple):
+    """What decides which kernels a run calls."""
+
+    law: str = "neo_hookean"
+    scheme: str = "stellar"
+    relaxation: str = "global"
+    audit: bool = True
+    has_sides: bool = True
+    """Whether the blade has a thickness."""
+    precision: str = "single"
+    relaxes: bool = False
+    """Whether the stress of the material relaxes."""
+    is_held: bool = False
+    """Whether attachments hold the body, or graspers do in the same way."""
+    has_table: bool = True
+    """Whether the body touches rigid geoms: a table, or a second hand."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> "KernelSet":
+        """Return the set that a scene needs."""
+        has_sides = scene.blade is not None
+        law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
+        how = (scene.audit, has_sides, scene.precision)
+        relaxes = bool(scene.material.prony)
+        is_held = bool(scene.attachments) or any(
+            grasper.holds == "attachment" for grasper in scene.graspers
+        )
+        has_table = scene.table is not None or bool(scene.graspers)
+        return cls(law, scheme, relaxation, *how, relaxes, is_held, has_table)
+
+    @property
+    def _prony(self) -> tuple[tuple[float, float], ...]:
+        """Return a Prony series that needs this set."""
+        return ((0.5, 1.0),) if self.relaxes else ()
+
+    def solver(self) -> SolverSettings:
+        """Return settings that need this set."""
+        return SolverSettings(
+            scheme=self.scheme,
+            relaxation=self.relaxation,
+            precision=self.precision,
+            audit=self.audit,
+        )
+
+    def body(self, mesh: TetrahedralMesh, fixed: str = "none") -> Tissue:
+        """Return a tissue that needs this set."""
+        return Tissue(
+            mesh,
+            PHANTOM if self.law == "springs" else replace(PARENCHYMA, prony=self._prony),
+            fixed=fixed_nodes(mesh, fixed),
+            blade=BladeShape() if self.has_sides else None,
+            solver=self.solver(),
+        )
+
+
+USUAL_SETS = (KernelSet(), KernelSet(relaxation="verlet", audit=False))
+"""Those of the default scene, as `run` and as `view` do it."""
+
+
+def kernels_are_compiled(kernels: KernelSet) -> bool:
+    """Return whether the cache has all kernels of a set, compiled from exactly these sources."""
+    return _mark(kernels).exists() or _mark(kernels._replace(has_table=True)).exists()
+
+
+def prepare_kernels(
+    sets: Sequence[KernelSet] = USUAL_SETS, on_progress: Progress = lambda n, n_all: None
+) -> None:
+    """Load the kernels, or compile them where this is the first run of these sources."""
+    compile_ahead(sets, on_progress)
+    for kernels in sets:
+        _cut(kernels)
+        _move(kernels)
+
+
+def compile_ahead(sets: Sequence[KernelSet], on_progress: Progress = lambda n, n_all: None) -> None:
+    """Compile the kernels of some sets by all cores, where the cache does not have them.
+
+    Two processes compile the first set, and with it most of what the others share; then as many as
+    there are cores compile the others, each a share of them. The cache passes on the binaries. What
+    they do not compile is compiled where it is used.
+    """
+    missing = [kernels for kernels in sets if not kernels_are_compiled(kernels)]
+    if not (missing and is_compiling()):
+        return
+    first, others, n_cores = missing[:1], missing[1:], os.cpu_count() or 1
+    shares = [share for i in range(n_cores) if (share := others[i::n_cores])]
+    are_done = True
+    with StopSignals() as stop:
+        for tasks in ([(job, first) for job in _JOBS], [(_EVERY_JOB, share) for share in shares]):
+            with _processes(tasks) as processes:
+                while any(process.poll() is None for process in processes):
+                    if stop.reason is not None:
+                        raise SignalInterrupt(stop.reason)
+                    found = n_compiled_kernels()
+                    on_progress(found, max(found, USUAL_NUMBER))
+                    time.sleep(_SECONDS_PER_LOOK)
+                are_done &= not any(process.returncode for process in processes)
+    if are_done:
+        found = n_compiled_kernels()
+        on_progress(found, found)
+        for kernels in missing:
+            _note(kernels)
+
+
+@contextmanager
+def _processes(
+    tasks: Sequence[tuple[str, Sequence[KernelSet]]],
+) -> Iterator[list["subprocess.Popen[bytes]"]]:
+    """Start a process for each job and its sets, and end them where this one is interrupted."""
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-m", "scalpel_sim.runs.warm_up", job, *map(json.dumps, sets)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for job, sets in tasks
+    ]
+    try:
+        yield started
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _mark(kernels: KernelSet) -> Path:
+    """Return the file that says that a set is complete."""
+    return cache_directory() / ("-".join(map(str, kernels)) + ".complete")
+
+
+def _note(kernels: KernelSet) -> None:
+    """Note that a set is complete. Where nothing can be written, nothing was."""
+    try:
+        _mark(kernels).touch()
+    except OSError:
+        return
+
+
+def _cut(kernels: KernelSet, dt: float = _DT) -> None:
+    """Settle a small block, cut it through in steps of `dt` [s], and measure it."""
+    tissue = kernels.body(block((2, 2, 2), (_SIDE, _SIDE, _SIDE)), "left,right")
+    if dt > 0.0:
+        if kernels.is_held:
+            _hold(tissue)
+        if kernels.has_table:
+            board = Geom("board", "box", (_SIDE, _SIDE, _SIDE), 0.5)
+            tissue.collide_with([board], [[0.5 * _SIDE, 0.5 * _SIDE, -_SIDE]])
+        tissue.settle()
+    before = _edge(-0.1)
+    for fraction in np.linspace(-0.1, 1.5, N_STEPS):
+        after = _edge(fraction)
+        result = tissue.step(BladeSweep(before, after), dt)
+        before = after
+    wall_times = WallTimes(*result.stage_times, 0.0, 0.0)
+    wrenches = (result.wrench, result.wrench)
+    FrameRows(TissueFrame()).row_of(0.0, before, *wrenches, result, wall_times)
+    force_parts(result.contacts, before.forward)
+    tissue.step(None, dt)
+    tissue.chunks()
+    tissue.surface()
+    tissue.surface_values("strain")
+    tissue.surface_values("stress")
+    tissue.snapshot()
+    tissue.n_pieces()
+    tissue.cut_report()
+
+
+def _hold(tissue: Tissue) -> None:
+    """Attach the block, and tie it by a strand across the way of the edge."""
+    tissue.attach("right", stiffness=10.0)
+    middle = _SIDE / 2.0
+    beyond = (_SIDE, middle, 1.5 * _SIDE)
+    tissue.tie([[0.0, middle, _SIDE]], beyond, stiffness=10.0, area=1e-6, toughness=10.0)
+
+
+def _incise_and_cut(kernels: KernelSet) -> None:
+    """Cut a block before its motion, which the other process compiles meanwhile.
+
+    First a block of springs alone, for elements are also a part of motion; then one whose time
+    stands still. What both processes need at once both would compile.
+    """
+    places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
+    of_springs = kernels._replace(law="springs", audit=False)
+    of_springs.body(block((2, 2, 2), (_SIDE, _SIDE, _SIDE))).incise(places, _edge(0.0).forward)
+    _cut(kernels, dt=0.0)
+    _cut(kernels)
+
+
+def _move_two_pieces(kernels: KernelSet) -> None:
+    """Advance two falling pieces, which may touch, by a step: forces, integration and contact."""
+    mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
+    apart = np.vstack([mesh.positions, mesh.positions + 2.0 * _SIDE])
+    both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
+    kernels.body(TetrahedralMesh(apart, both)).step(None, _DT)
+
+
+def _lead_an_arm() -> None:
+    """Let a hand lead an arm beside any tissue, and compile what a bridge computes in a frame."""
+    compiled_arithmetic()
+    arm = Arm()
+    pose = arm.blade.segment()
+    stroke = Stroke((0.0, 1.0), (pose, pose))
+    StrokeFollower(arm.hand, stroke, TissueFrame()).lead(0.0)
+    stroke.pose(0.0)
+    CollisionMonitor(arm).check()
+
+
+def _move(kernels: KernelSet) -> None:
+    """Move two pieces, and an arm."""
+    _move_two_pieces(kernels)
+    _lead_an_arm()
+
+
+def _edge(fraction: float) -> BladeSegment:
+    """Return an upright edge in the block's middle, `fraction` of the way from front to back."""
+    x, y = _SIDE / 2.0, fraction * _SIDE
+    return BladeSegment(
+        tip=np.array([x, y, -_SIDE]),
+        heel=np.array([x, y, 2.0 * _SIDE]),
+        forward=np.array([0.0, 1.0, 0.0]),
+    )
+
+
+_JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move, "cut": _incise_and_cut}
+"""Jobs of two processes for a set. Each takes half of the time."""
+_EVERY_JOB = "all"
+"""Name of all jobs, one after the other."""
+
+
+def _main(job: str, *sets: str) -> None:
+    """Do a job for sets that are given as JSON."""
+    gc.disable()  # the compiler makes millions of objects and few cycles
+    for kernels in sets:
+        for name, compile_part in _JOBS.items():
+            if job in (name, _EVERY_JOB):
+                compile_part(KernelSet(*json.loads(kernels)))
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])

@@ -1,0 +1,1 @@
+"""A scene: its parts, and from its file to them."""

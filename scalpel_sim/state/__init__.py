@@ -1,1 +1,0 @@
-"""The state of a simulation, to which it can be put back."""

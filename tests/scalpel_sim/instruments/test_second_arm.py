@@ -1,0 +1,186 @@
+"""Arms that hold a grasper beside the first: presets, robots from MJCF, and those of a package."""
+
+import importlib.util
+import itertools
+import re
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from bridge import TissueFrame
+from scalpel_sim.arm.arm import Arm
+from scalpel_sim.arm.placement import PlacementError, covered, place
+from scalpel_sim.errors import UsageError
+from scalpel_sim.instruments.led_grasper import LedGrasper
+from scalpel_sim.instruments.second_arm import (
+    model_with_grasper,
+    path_of_grasper,
+    place_of_grasper,
+    place_of_led_grasper,
+    preset_with_grasper,
+)
+from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
+from scalpel_sim.strokes.planning import plan_stroke
+from tissue import Tissue, block
+
+ROBOT = Path(__file__).parents[3] / "docs" / "examples" / "robot.xml"
+LEFTWARDS, UP, Y = (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
+MOTION = GraspMotion(
+    [
+        Waypoint(0.0, (0.1, 0.03, 0.02), LEFTWARDS, UP, 0.015),
+        Waypoint(0.4, (0.08, 0.02, 0.04), (-0.9, 0.1, -0.3), Y, 0.005),
+    ],
+    "left",
+)
+FROM_LEFT = GraspMotion([Waypoint(0.0, (-0.01, 0.03, 0.02), (1.0, 0.0, 0.0), UP, 0.01)], "left")
+BODY = block((2, 2, 2), (0.06, 0.06, 0.03))
+BOUNDS = np.array([[0.0, 0.0, 0.0], [0.06, 0.06, 0.03]])
+TIMES = np.linspace(0.0, 0.4, 9)
+FRAME = TissueFrame(origin=np.array([0.1, 0.2, 0.3]))
+
+
+def preset():
+    placement, _ = place_of_grasper(MOTION, BOUNDS, "auto", TIMES, table=-0.05, others=[])
+    return preset_with_grasper(MOTION, placement, FRAME)
+
+
+def robot(path=ROBOT, at="wrist_3", pos=(0.6, 0.03, -0.1)):
+    return model_with_grasper(MOTION, path, at, TissueFrame(origin=np.array(pos)), FRAME)
+
+
+def misses_of(held, motion=MOTION):
+    """Do a motion beside another arm; how far are the pads from where they are to be [m, rad]?"""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of MuJoCo, that parts of the model contradict each other
+        arm = Arm("touch", base_position=(-1.0, 0.0, 0.0), others=[held])
+    (grasper,) = arm.graspers
+    led = LedGrasper(grasper, arm.data, motion, Tissue(BODY), FRAME, None)
+    wanted = motion.stroke(0.0, 0.01)
+    misses = []
+    for _ in range(round((motion.duration + 0.05) / arm.model.opt.timestep)):
+        now = arm.time
+        led.lead(now)
+        arm.step1()
+        pose = FRAME.segment_to_world(wanted.pose(now))
+        along = pose.tip - pose.heel
+        cosine = grasper.pads.axes[:, 1] @ along / np.linalg.norm(along)
+        off = np.linalg.norm(grasper.pads.centre - pose.heel)
+        misses.append((off, np.arccos(min(cosine, 1.0)), grasper.opening - motion.opening(now)))
+        arm.step2()
+        arm.check()
+    return np.abs(misses)
+
+
+@pytest.mark.parametrize("make", [preset, robot])
+def test_pads_follow_the_motion_from_its_start_to_its_end(make):
+    misses = misses_of(make())
+    assert (misses[0] < (1e-4, 1e-3, 1e-5)).all()
+    assert (misses[:, 0] < 1e-3).all() and (misses[:, 1] < 0.01).all()
+    assert (misses[-1] < (2e-4, 2e-3, 1e-4)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "pos"), [("panda", (0.55, 0.03, -0.4)), ("ur5e", (0.6, 0.03, -0.1))]
+)
+def test_robots_of_a_public_package_hold_the_grasper(name, pos):
+    package = importlib.util.find_spec("robosuite")
+    if package is None or package.origin is None:
+        pytest.skip("its models come with robosuite: pip install --no-deps robosuite")
+    folder = Path(package.origin).parent / "models" / "assets" / "robots"
+    turned = TissueFrame(np.diag([-1.0, -1.0, 1.0]), np.array(pos))  # it faces the tissue
+    path = folder / name / "robot.xml"
+    misses = misses_of(model_with_grasper(MOTION, path, "right_hand", turned, FRAME))
+    assert (misses[:, 0] < 1e-3).all() and (misses[:, 1] < 0.03).all()
+    assert (misses[-1] < (2e-4, 0.01, 1e-4)).all()
+
+
+def test_a_robot_that_is_turned_in_the_frame_of_the_tissue_stands_so_in_the_world():
+    turn = Rotation.from_rotvec([0.0, 0.0, 0.5]).as_matrix()
+    base = TissueFrame(turn, np.array([0.55, 0.1, -0.1]))
+    held = model_with_grasper(MOTION, ROBOT, "wrist_3", base, FRAME)
+    arm = Arm("touch", base_position=(-1.0, 0.0, 0.0), others=[held])
+    model, shoulder = arm.model, arm.model.body("left_shoulder").id
+    assert model.body_pos[shoulder] == pytest.approx([0.65, 0.3, 0.2 + 0.1625])
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, model.body_quat[shoulder])
+    assert matrix.reshape(3, 3) == pytest.approx(turn, abs=1e-9)
+
+
+def test_a_second_arm_stands_on_the_table_of_the_first_and_clear_of_it():
+    stroke = plan_stroke("straight", BODY, speed=0.06)
+    first = place(stroke, BOUNDS)
+    times = np.linspace(0.0, stroke.duration, 9)
+    table, there = -float(first.tissue_origin[2]), covered(first, stroke, BOUNDS, times)
+    second, spheres = place_of_grasper(
+        FROM_LEFT, BOUNDS, "auto", times, table=table, others=[there]
+    )
+    assert second.base_position[2] >= 0.0
+    assert second.tissue_origin == pytest.approx(first.tissue_origin)
+    apart = np.linalg.norm(spheres.centres[:, :, None] - there.centres[:, None], axis=3)
+    assert (apart > spheres.radii[:, None] + there.radii).all()
+
+
+def test_an_arm_that_reaches_only_where_the_other_is_says_so():
+    placement, _ = place_of_grasper(MOTION, BOUNDS, "touch", TIMES, table=None, others=[])
+    there = covered(placement, path_of_grasper(MOTION), BOUNDS, TIMES, edge_height=0.0)
+    everywhere = there._replace(radii=there.radii + 1.0)
+    with pytest.raises(PlacementError, match="not clear of the other arm"):
+        place_of_grasper(MOTION, BOUNDS, "touch", TIMES, table=None, others=[everywhere])
+
+
+ROOM = np.array([[-0.06, -0.06, 0.0], [0.3, 0.12, 0.09]])
+"""Where a hand is to lead the grasper [m], farther than any arm reaches."""
+
+
+def led_preset():
+    rest = MOTION.at_rest()
+    place, _, room = place_of_led_grasper(rest, ROOM, BOUNDS, "auto", TIMES, table=-0.05, others=[])
+    return preset_with_grasper(rest, place, FRAME, workspace=room)
+
+
+def led_robot():
+    base = TissueFrame(origin=np.array([0.6, 0.03, -0.1]))
+    return model_with_grasper(MOTION.at_rest(), ROBOT, "wrist_3", base, FRAME, workspace=ROOM)
+
+
+@pytest.mark.parametrize("make", [led_preset, led_robot])
+def test_an_arm_reaches_all_corners_of_the_room_in_which_a_hand_leads_its_grasper(make):
+    held = make()
+    room = held.workspace
+    assert (room[0] >= ROOM[0]).all() and (room[1] <= ROOM[1]).all()
+    assert (room[0] < MOTION.start.at).all() and (room[1] > MOTION.start.at).all()
+    corners = [np.choose(sides, room) for sides in itertools.product((0, 1), repeat=3)]
+    ways = [MOTION.start, *(MOTION.start._replace(at=corner) for corner in corners)]
+    motion = GraspMotion([way._replace(time=0.8 * i) for i, way in enumerate(ways)], "left")
+    at_corners = misses_of(held, motion)[[800 * i for i in range(1, len(ways))]]
+    assert (at_corners < (1e-3, 0.01, 1e-4)).all()
+
+
+def test_an_arm_whose_grasper_a_hand_leads_is_clear_of_the_other_at_the_start():
+    stroke = plan_stroke("straight", BODY, speed=0.06)
+    first = place(stroke, BOUNDS)
+    at_start = np.zeros(1)
+    there = covered(first, stroke, BOUNDS, at_start)
+    table = -float(first.tissue_origin[2])
+    _, spheres, _ = place_of_led_grasper(
+        FROM_LEFT.at_rest(), ROOM, BOUNDS, "auto", at_start, table=table, others=[there]
+    )
+    apart = np.linalg.norm(spheres.centres[:, :, None] - there.centres[:, None], axis=3)
+    assert (apart > spheres.radii[:, None] + there.radii).all()
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "expected"),
+    [
+        ({"at": "flange"}, UsageError, "[[grasper]] 'left' model"),
+        ({"path": Path("no.xml")}, UsageError, "no.xml"),
+        ({"pos": (5.0, 0.0, 0.0)}, PlacementError, "does not reach the stroke"),
+    ],
+)
+def test_a_model_that_cannot_hold_it_there_is_refused(given, error, expected):
+    with pytest.raises(error, match=re.escape(expected)):
+        robot(**given)
