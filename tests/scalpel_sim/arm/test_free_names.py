@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from msgspec.structs import replace as changed
-from tests.scalpel_sim.arm.test_own_arm import EXAMPLES, ROBOT
+from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
 
 from bridge import FixtureMesh
 from scalpel_sim import GrasperTable, WaypointTable, prepare, read_scene

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from msgspec.structs import replace as changed
-from tests.scalpel_sim.arm.test_own_arm import (
+from tests.scalpel_sim.instruments.test_own_arm import (
     EXAMPLES,
     FORWARD,
     changed_model,
