@@ -7,15 +7,18 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from bridge import Fixture, InProcessLink, TissueLink
+from scalpel_sim.arm.arm import LedArm
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.free_names import free_name
-from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.standing_fixture import StandingFixture
+from scalpel_sim.arm.standing import StandingFixture, Tabletop
 from scalpel_sim.instruments.geom_coupling import GeomCoupling
-from scalpel_sim.instruments.scene_arms import ArmSurroundings, own_arm_in, project_arm_in
+from scalpel_sim.instruments.scene_arms import (
+    ArmSurroundings,
+    own_arm_in,
+    project_arm_in,
+    resting_stroke,
+)
 from scalpel_sim.instruments.scene_graspers import led_graspers, motions_of
-from scalpel_sim.instruments.tabletop import Tabletop
-from scalpel_sim.instruments.workspace import resting_stroke
 from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation

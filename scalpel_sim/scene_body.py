@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
+from scalpel_sim.arm.standing import Tabletop
 from scalpel_sim.errors import UsageError
-from scalpel_sim.instruments.tabletop import Tabletop
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.strokes.stroke import from_csv
 from scalpel_sim.tables.attachment import AttachmentTable, times_of

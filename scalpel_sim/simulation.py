@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
+from scalpel_sim.arm.arm import LedArm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
-from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.instruments.led_grasper import LedGrasper
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.recording.frame_row import FrameRows, WallTimes

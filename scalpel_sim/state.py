@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from bridge import InProcessLink, LedGrip, Proxy, TissueFrame, TissueLink
-from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.arm import LedArm
 from scalpel_sim.instruments.grip import Grip
 from scalpel_sim.instruments.led_grasper import LedGrasper
 from scalpel_sim.recording.recording import Recording

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bridge import Collisions, Fixture, FixtureBox
+from scalpel_sim.arm.arm import LedArm
 from scalpel_sim.arm.collision_geoms import (
     TABLE_THICKNESS,
     WORLD,
@@ -15,8 +16,7 @@ from scalpel_sim.arm.collision_geoms import (
     arms_of_geoms,
     tables,
 )
-from scalpel_sim.arm.collision_groups import collide
-from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.standing import collide
 from tissue import FloatArray, IntArray
 
 FLOOR_MARGIN = 0.02

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.arm import LedArm
 from tissue import BladeSegment, BoolArray, FloatArray
 
 NEAR_PLACE: Final = 5e-4

@@ -231,7 +231,7 @@ def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: Print
         results_as_json,
         save_results,
     )
-    from scalpel_sim.output.file_check import check_file
+    from scalpel_sim.output.export import check_file
     from scalpel_sim.runs.prepared_run import load_kernels
 
     if not 1 <= options.runs <= MOST_ROUNDS:

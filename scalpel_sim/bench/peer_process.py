@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.recording.unnamed_file import unnamed_file
+from scalpel_sim.recording.row_store import unnamed_file
 from tissue import FloatArray
 
 _ADAPTERS = Path(__file__).parent / "peers"

@@ -24,8 +24,7 @@ from scalpel_sim.bench.results import (
 from scalpel_sim.bench.tables import compact_table
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
-from scalpel_sim.output.summary import STAGES
-from scalpel_sim.output.table_1 import MACHINE, TABLE_1
+from scalpel_sim.output.summary import MACHINE, STAGES, TABLE_1
 from scalpel_sim.planned_cut import PlannedCut, prepare_cut
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.scene_body import make_tissue

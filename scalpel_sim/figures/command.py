@@ -41,7 +41,7 @@ def figure(
         output: The file [default: figure10.png (11, ...) in this folder].
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
-    from scalpel_sim.output.file_check import check_file
+    from scalpel_sim.output.export import check_file
     from scalpel_sim.scene_parts.choices import check_scheme
 
     path = output or Path(f"figure{number}.png")

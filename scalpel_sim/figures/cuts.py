@@ -9,7 +9,7 @@ from scalpel_sim.planned_cut import PlannedCut, prepare_cut
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.model_shapes import Shape, body_poses, shapes_of
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
+from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import FloatArray, Snapshot, Surface
 
 STRETCH = 0.3

@@ -26,7 +26,7 @@ from scalpel_sim.figures.table import table_below
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
-from scalpel_sim.viewer.texture_mapping import map_texture
+from scalpel_sim.viewer.textures import map_texture
 from tissue import FloatArray, whole_file
 
 WHITE = (1.0, 1.0, 1.0)

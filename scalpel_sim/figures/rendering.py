@@ -10,7 +10,7 @@ import numpy as np
 from scalpel_sim.figures.camera import View
 from scalpel_sim.figures.light import Lights, SurfacePoints, illuminate, make_lights
 from scalpel_sim.figures.rasterise import Raster, rasterise
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
+from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import BoolArray, FloatArray, IntArray
 
 GAMMA = 2.2

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
+from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import FloatArray
 
 _REACH = 6.0

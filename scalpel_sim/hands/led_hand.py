@@ -6,10 +6,20 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from scalpel_sim.hands.commands import LeadingCommand
-from scalpel_sim.hands.instrument import Instrument
-from scalpel_sim.hands.live_blade import LiveBlade
-from scalpel_sim.hands.live_grasper import LiveGrasper
+import numpy as np
+
+from scalpel_sim.hands.commands import (
+    LONGEST_SILENCE,
+    Choose,
+    End,
+    Engage,
+    Jaws,
+    LeadingCommand,
+    Move,
+    Release,
+    Turn,
+)
+from scalpel_sim.hands.driven_instruments import Instrument, LiveBlade, LiveGrasper
 from scalpel_sim.simulation import Simulation
 from tissue import FloatArray
 
@@ -126,3 +136,35 @@ def _live_graspers(simulation: Simulation) -> tuple[LiveGrasper, ...]:
         frame, dt = simulation.frame, simulation.dt
         found.append(LiveGrasper(each.grasper, each.motion, frame, each.workspace, dt))
     return tuple(found)
+
+
+class LiveHand(LedHand):
+    """A hand that obeys the commands of a page; see `LedHand`."""
+
+    def _obey(self) -> bool:
+        """Do what the commands say; return whether one of them ends the run."""
+        has_ended = False
+        while self.commands:
+            command = self.commands.popleft()
+            self._heard_at = self._clock()
+            chosen = self.instruments[self.chosen]
+            if isinstance(command, Move | Turn):
+                self.stamp = command.stamp
+                by = self._frame.vectors_to_tissue(np.array(command.by))
+                if self.is_engaged and isinstance(command, Move):
+                    chosen.pose.move(by)
+                elif self.is_engaged:
+                    chosen.pose.turn(by)
+            elif isinstance(command, Engage):
+                self.is_engaged = True
+            elif isinstance(command, Release):
+                self.let_go()
+            elif isinstance(command, Choose):
+                self.choose(command.instrument)
+            elif isinstance(command, Jaws):
+                chosen.close_jaws(command.closed)
+            elif isinstance(command, End):
+                has_ended = True
+        if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
+            self.let_go()
+        return has_ended

@@ -1,9 +1,11 @@
-"""What a page asks of a run: to stand still, to go slowly, to go back, and to lead its hand."""
+"""Requests of a page to a run: to pause, to slow down, to go back, and to lead its hand."""
 
 import time
 from collections import deque
 from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
 
+from bridge import InProcessLink
 from scalpel_sim.hands.commands import (
     Begin,
     Choose,
@@ -19,15 +21,152 @@ from scalpel_sim.hands.commands import (
     Step,
     Undo,
 )
-from scalpel_sim.hands.history import History
 from scalpel_sim.hands.led_hand import LedHand
-from scalpel_sim.hands.pace import Pace
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.state import SimulationState
 
 FRAMES_PER_STEP = 10
 """Frames of a step: a hundredth of a second, in which a blade that cuts goes half a millimetre."""
 
 SECONDS_ASLEEP = 0.01
 """How often a run that stands still looks for commands [s]."""
+
+MOST_STROKES = 50
+"""Strokes that can be undone. Each keeps a state of the body in memory, some megabytes."""
+
+SHORTEST_PAUSE = 5e-3
+"""Shortest pause that slows a run to real time [s]: a shorter one costs more than it gains."""
+
+MOST_BEHIND = 0.05
+"""How far simulated time may fall behind and be caught up [s]. What is lost beyond is lost: a blade
+that is led by hand must not run ahead of the hand afterwards."""
+
+MEASURED_OVER = 0.5
+"""Wall time over which the factor is measured [s]."""
+
+
+class Follower(Protocol):
+    """What has a part of the run so far: a file, a replay."""
+
+    def mark(self) -> Any:
+        """Return how far it has got."""
+
+    def cut_back(self, mark: Any) -> None:
+        """Forget what came after a mark."""
+
+
+class _Moment(NamedTuple):
+    """A run at the end of a frame."""
+
+    state: SimulationState
+    marks: list[Any]
+    """Of each follower."""
+
+
+class History:
+    """What a run was at its start, and before each of its last strokes.
+
+    Args:
+        simulation: The run, at its start.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._followers: list[Follower] = []
+        self._start: _Moment | None = None
+        self._moments: list[_Moment] = []
+
+    @property
+    def can_go_back(self) -> bool:
+        """Whether the run can go back: the state of a tissue in another process is out of reach."""
+        return isinstance(self._simulation.link, InProcessLink)
+
+    @property
+    def n_strokes(self) -> int:
+        """How many strokes can be undone."""
+        return len(self._moments)
+
+    def begin(self, *followers: Follower) -> None:
+        """Keep the start.
+
+        Args:
+            followers: What goes back with the simulation.
+        """
+        self._followers += followers
+        if self.can_go_back:
+            self._start = self._now()
+
+    def add(self) -> None:
+        """Keep the present as that before a stroke."""
+        if self.can_go_back:
+            self._moments = [*self._moments[-(MOST_STROKES - 1) :], self._now()]
+
+    def drop(self) -> None:
+        """Forget the moment before the last stroke: that was none."""
+        del self._moments[-1:]
+
+    def undo(self) -> bool:
+        """Go back to before the last stroke; return whether there was one."""
+        return bool(self._moments) and self._go_to(self._moments.pop())
+
+    def reset(self) -> bool:
+        """Go back to the start; return whether it is known."""
+        self._moments.clear()
+        return self._start is not None and self._go_to(self._start)
+
+    def _now(self) -> _Moment:
+        marks = [each.mark() for each in self._followers]
+        return _Moment(self._simulation.save_state(), marks)
+
+    def _go_to(self, moment: _Moment) -> bool:
+        self._simulation.load_state(moment.state)
+        for follower, mark in zip(self._followers, moment.marks, strict=True):
+            follower.cut_back(mark)
+        return True
+
+
+class Pace:
+    """Slows a simulation to real time, or to slow motion, where it is faster.
+
+    Args:
+        clock: Wall time [s].
+        sleep: Waits for so many seconds.
+        shortest_pause: Shortest pause that slows the run [s]; 0: it waits after each frame, as a
+            device needs it.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+        shortest_pause: float = SHORTEST_PAUSE,
+    ) -> None:
+        self.rate = 1.0
+        """Simulated time over wall time, at most."""
+        self.factor = 1.0
+        """Simulated time over wall time, lately."""
+        self._clock, self._sleep = clock, sleep
+        self._shortest_pause = shortest_pause
+        self._due = self._since = clock()
+        self._simulated = 0.0
+
+    def wait(self, dt: float) -> None:
+        """Wait, after a frame of that length [s], until its end is due."""
+        self._due += dt / self.rate
+        self._simulated += dt
+        now = self._clock()
+        if self._due - now > self._shortest_pause:
+            self._sleep(self._due - now)
+            now = self._clock()
+        self._due = max(self._due, now - MOST_BEHIND)
+        if now - self._since >= MEASURED_OVER:
+            self.factor = self._simulated / (now - self._since)
+            self._simulated, self._since = 0.0, now
+
+    def go_on(self) -> None:
+        """Forget the time that has passed since the last frame: it was not the simulation's."""
+        self._due = self._since = self._clock()
+        self._simulated = 0.0
 
 
 class RunControls:

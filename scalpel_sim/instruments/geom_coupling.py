@@ -7,10 +7,9 @@ import mujoco
 import numpy as np
 
 from bridge import Bridge, GeomLoads, GeomPoses, LedContact, TissueFrame, TouchedGeoms
-from scalpel_sim.arm.body_wrench import about_centre_of_mass
+from scalpel_sim.arm.blade import about_centre_of_mass
 from scalpel_sim.arm.collision_geoms import WORLD
-from scalpel_sim.instruments.model_bodies import body_number
-from scalpel_sim.instruments.tissue_frames import frame_of
+from scalpel_sim.instruments.grip import body_number, frame_of
 from tissue import FloatArray, Geom, IntArray, Tissue, Wrench
 
 _SHAPES: dict[int, tuple[str, int]] = {

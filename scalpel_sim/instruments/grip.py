@@ -8,9 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge import Bridge, LedGrip, TissueFrame
-from scalpel_sim.arm.body_wrench import about_centre_of_mass
-from scalpel_sim.instruments.model_bodies import body_number
-from scalpel_sim.instruments.tissue_frames import frame_of
+from scalpel_sim.arm.blade import about_centre_of_mass
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
 
@@ -129,3 +127,27 @@ class Grip:
         if self.n_points:
             self._tissue.release(self.attachment)  # type: ignore[arg-type]  # it is of this one
         self.apply()
+
+
+def body_number(model: mujoco.MjModel, name: str, error: type[ValueError]) -> int:
+    """Return MuJoCo's number of a body.
+
+    Args:
+        model: The model.
+        name: Name of the body.
+        error: What to raise where there is none.
+
+    Raises:
+        ValueError: `error`, with the names that there are.
+    """
+    number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name))
+    if number < 0:
+        names = [model.body(i).name for i in range(1, model.nbody)]
+        there = ", ".join(f"'{each}'" for each in names if each) or "none with a name"
+        raise error(f"the model has no body '{name}'. It has: {there}")
+    return number
+
+
+def frame_of(tissue: Tissue | Bridge, frame: TissueFrame) -> TissueFrame:
+    """Return the frame of a tissue in the world: `frame`, or that of the bridge to it."""
+    return tissue.frame if isinstance(tissue, Bridge) else frame

@@ -9,9 +9,8 @@ import numpy as np
 
 from bridge import Bridge, TissueFrame
 from scalpel_sim.arm.grasper import HALF_PAD, GuidedGrasper, Pads
-from scalpel_sim.instruments.grip import Grip
+from scalpel_sim.instruments.grip import Grip, frame_of
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
-from scalpel_sim.instruments.tissue_frames import frame_of
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from tissue import FloatArray, Tissue, Wrench
 

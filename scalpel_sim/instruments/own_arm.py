@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
+from scalpel_sim.arm.arm import LedArm
 from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
 from scalpel_sim.arm.hand import Impedance
-from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.arm.reachable_box import (
     SMALLEST_SHARE,

@@ -9,9 +9,8 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, Fixture, TissueFrame
-from scalpel_sim.arm.grasper import HALF_PAD
-from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.grasper import HALF_PAD, HeldArm
 from scalpel_sim.arm.placement import (
     Placement,
     PlacementError,
@@ -20,23 +19,29 @@ from scalpel_sim.arm.placement import (
     stays_in_reach,
 )
 from scalpel_sim.arm.reachable_box import arm_for, grown_within, placed_within, shrunk, tour_of
-from scalpel_sim.arm.standing import Standing
-from scalpel_sim.arm.standing_fixture import StandingFixture
+from scalpel_sim.arm.standing import Standing, StandingFixture, Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.own_arm import move_to_start, move_within, own_arm
 from scalpel_sim.instruments.scene_graspers import arms_with_graspers
-from scalpel_sim.instruments.tabletop import Tabletop
-from scalpel_sim.instruments.workspace import ROOM_OF_GRASPER, resting_stroke, workspace_in
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.strokes.expected_force import ExpectedForce
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import FloatArray
+from tissue import BladeSegment, FloatArray
 
 _SAME_LENGTH = 1e-9
 """Share by which two lengths of one blade may differ, by rounding."""
+
+ROOM = 0.02
+"""Room around the body for the tip of a blade [m]: enough to lift it out and set it on elsewhere.
+The larger of the arms reaches it around every body of the scenes whose blade stands upright; with
+30 mm it would have little room left in its joints."""
+
+ROOM_OF_GRASPER = 0.06
+"""Room around the body for the tip of a grasper [m]: enough to lift what it holds, and to lay it
+down beside the body."""
 
 
 class ArmSurroundings(NamedTuple):
@@ -257,3 +262,43 @@ def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[LedArm, TissueFr
         raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
     mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
     return arm, TissueFrame(axes.reshape(3, 3), np.array(own.pos))
+
+
+def workspace(
+    start: BladeSegment, bounds: FloatArray, lowest: float, room: float = ROOM
+) -> FloatArray:
+    """Return the lowest and the highest place of the middle of the edge [m], shape (2, 3).
+
+    There the tip is in the body, or a little beside or above it, with the edge as at the start; the
+    start lies in it wherever it is.
+
+    Args:
+        start: The pose of the blade at the start, tissue frame; of a grasper, its pads as an edge.
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+        lowest: Height of what lies under the body [m]; minus infinity: nothing.
+        room: How far the tip may be beside the body or above it [m].
+    """
+    low, high = bounds[0] - room, bounds[1] + room
+    low[2] = max(low[2], lowest)
+    to_middle = 0.5 * (start.heel - start.tip)
+    return np.stack([np.minimum(low, start.tip), np.maximum(high, start.tip)]) + to_middle
+
+
+def workspace_in(
+    scene: Scene, start: BladeSegment, bounds: FloatArray, room: float = ROOM
+) -> FloatArray:
+    """Return the workspace around the body of a scene: not under its table or floor.
+
+    Args:
+        scene: The scene.
+        start: See `workspace`, as the rest.
+        bounds: Lowest and highest corner of the body [m].
+        room: How far the tip may be beside it [m].
+    """
+    stops = [height for height in (scene.table, scene.floor) if height is not None]
+    return workspace(start, bounds, max(stops, default=-math.inf), room)
+
+
+def resting_stroke(start: BladeSegment) -> Stroke:
+    """Return the stroke of a blade that rests until a hand leads it."""
+    return Stroke([0.0, 1.0], [start, start], "live hand", is_led=True)

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from bridge import Bridge, TissueFrame
-from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.grasper import HeldArm
 from scalpel_sim.arm.placement import AUTO, Placement, covered
 from scalpel_sim.instruments.led_grasper import Hold, LedGrasper
 from scalpel_sim.instruments.second_arm import (

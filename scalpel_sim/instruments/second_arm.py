@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
-from scalpel_sim.arm.arm import preset_spec, put_base
+from scalpel_sim.arm.arm import LedArm, preset_spec, put_base
 from scalpel_sim.arm.grasper import (
     FORWARD,
     GRASPER,
@@ -17,12 +17,11 @@ from scalpel_sim.arm.grasper import (
     PADS_TIP,
     SHAFT_LENGTH,
     Grasper,
+    HeldArm,
     add_grasper,
     grasper_spec,
 )
 from scalpel_sim.arm.hand import Impedance, add_hand
-from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.place_search import Spheres
 from scalpel_sim.arm.placement import (
     SAMPLES,

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.output.file_check import check_file
 from tissue import BoolArray, FloatArray, IntArray, Surface, whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
@@ -71,6 +70,35 @@ def check_exports(paths: Iterable[Path]) -> None:
         if ending not in _WRITERS:
             raise _unknown_ending(path)
         check_file(path, ending, "--export")
+
+
+def check_file(path: Path, suffix: str, option: str) -> None:
+    """Make sure that a file can be written, before the work whose result it is for.
+
+    Args:
+        path: The file; one that is there will be overwritten.
+        suffix: What its name must end in.
+        option: The option that chose it, for the message.
+
+    Raises:
+        UsageError: another suffix, a folder, or a file in a folder that does not exist.
+        RunError: the system refuses.
+    """
+    if path.suffix.lower() != suffix:
+        raise UsageError(f"{option} is {path}; its name must end in {suffix}")
+    if path.is_dir() or not path.parent.is_dir():
+        reason = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+        raise UsageError(f"{option} is {path}, and {reason}; choose another file")
+    is_new = not path.exists()
+    try:
+        with path.open("ab"):
+            pass
+        if is_new:
+            path.unlink()
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another {option}"
+        ) from error
 
 
 def surface_pieces(surface: Surface) -> list[SurfacePiece]:

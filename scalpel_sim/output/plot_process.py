@@ -89,8 +89,7 @@ class Plotter:
 
 def draw_requested_plots() -> None:
     """Load matplotlib, and draw the plots that standard input then asks for."""
-    from scalpel_sim.output.energy_plot import plot_energies
-    from scalpel_sim.output.force_plot import plot_forces
+    from scalpel_sim.output.plots import plot_energies, plot_forces
     from scalpel_sim.recording.recording import read_forces
 
     text = sys.stdin.readline()

@@ -5,9 +5,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from scalpel_sim.output.summary import COMPLETE, Summary
-from scalpel_sim.output.table_1 import TABLE_1
-from scalpel_sim.recording.energy_terms import TERMS
+from scalpel_sim.output.summary import COMPLETE, TABLE_1, Summary
+from scalpel_sim.recording.recording import TERMS
 
 STAGE_NAMES = {
     "RX": "relaxation",

@@ -1,11 +1,11 @@
-"""What happened in each frame, as one table of numbers."""
+"""What happened in each frame, as one table of numbers, with the terms of the energy account."""
 
 import math
 import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import msgspec
 import numpy as np
@@ -16,6 +16,7 @@ from tissue import Energies, FloatArray
 ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
 """Columns of the energy account since the start: the terms of `tissue.Energies`, and the residual.
 NaN without an audit."""
+
 N_OF_ACCOUNT = len(ACCOUNT)
 
 
@@ -53,6 +54,31 @@ are what the tissue does to the blade's edge, to its faces, and along them, at t
 times of the stages that the paper's Table 1 names: collision detection, geometric changes,
 relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering (`rd_s`)
 and without the recording of its row (`recording_s`)."""
+
+
+class Term(NamedTuple):
+    """A term of the energy account: a field of `tissue.Energies`."""
+
+    name: str
+    label: str
+    colour: str
+
+
+# Paul Tol's muted palette, which colour-blind readers can distinguish too.
+TERMS = (
+    Term("cutting", "cutting: toughness x area", "#cc6677"),
+    Term("breaking", "breaking the skin", "#882255"),
+    Term("friction", "friction on the blade", "#ddcc77"),
+    Term("damping", "damping", "#88ccee"),
+    Term("contact", "impacts of the tissue", "#44aa99"),
+    Term("topology", "change of the mesh", "#999933"),
+    Term("released", "released by the blade, net", "#aa4499"),
+    Term("elastic", "stored: elastic", "#117733"),
+    Term("held", "stored: at the blade", "#77cc77"),
+    Term("kinetic", "stored: motion", "#332288"),
+    Term("potential", "stored: height", "#bbbbbb"),
+)
+"""The terms in the order of the table: first what is dissipated, then what is stored."""
 
 
 def held_columns(n: int) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """`RowStore`: rows of numbers without end, of which memory holds some seconds' worth."""
 
 import mmap
+import os
 import struct
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -10,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from scalpel_sim.errors import RunError
-from scalpel_sim.recording.unnamed_file import unnamed_file
 from tissue import FloatArray
 
 ROWS_IN_MEMORY = 8192
@@ -129,3 +129,16 @@ class RowStore:
                 f"{where}: the recording cannot be written there ({error.strerror or error}); make "
                 "room"
             ) from error
+
+
+def unnamed_file(folder: Path | None = None) -> FileIO:
+    """Return such a file, open to read and to write, without a buffer.
+
+    Args:
+        folder: On whose disk it is; None: where the system has temporary files.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    with tempfile.TemporaryFile(buffering=0, dir=folder) as file:
+        return FileIO(os.dup(file.fileno()), "r+b")

@@ -14,10 +14,8 @@ from bridge import (
 )
 from scalpel_sim.errors import Interrupted, RunError, UsageError
 from scalpel_sim.hands.device_hand import WATCHDOG, DeviceHand
-from scalpel_sim.hands.history import History
 from scalpel_sim.hands.limited_pose import MOST_SPEED, MOST_TURN_RATE
-from scalpel_sim.hands.pace import Pace
-from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.hands.run_controls import History, Pace, RunControls
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.runs.console import print_report, say, stay_while

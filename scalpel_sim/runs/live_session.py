@@ -12,10 +12,8 @@ from typing import NamedTuple, Self
 from bridge import LinkError
 from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.hands.commands import Begin, Choose, Command, End, Engage, Jaws
-from scalpel_sim.hands.history import History
-from scalpel_sim.hands.live_hand import LiveHand
-from scalpel_sim.hands.pace import Pace
-from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.hands.led_hand import LiveHand
+from scalpel_sim.hands.run_controls import History, Pace, RunControls
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.runs.console import SECONDS_PER_CHECK, print_report, say

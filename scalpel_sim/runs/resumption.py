@@ -10,10 +10,9 @@ import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import COMPLETE
-from scalpel_sim.recording.file_sum import FileSum, sum_of, sums_that_hold
+from scalpel_sim.recording.growing_file import FileSum, sum_of, sums_that_hold
 from scalpel_sim.recording.recording import WALL_TIMES, Recording, read_forces
-from scalpel_sim.runs.checkpoint import Checkpoint
-from scalpel_sim.runs.checkpoints import Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints
 from scalpel_sim.runs.file_names import (
     FORCES,
     INITIAL,
@@ -23,7 +22,7 @@ from scalpel_sim.runs.file_names import (
     SCENE,
     SUMMARY,
 )
-from scalpel_sim.runs.run_notes import RunMark, RunPlan, read_journal
+from scalpel_sim.runs.journal import RunMark, RunPlan, read_journal
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state import SimulationState
 from tissue import FloatArray, whole_file

@@ -13,13 +13,13 @@ from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.summary import COMPLETE, Summary
-from scalpel_sim.recording.file_sum import FileSum, sum_of
+from scalpel_sim.recording.growing_file import FileSum, sum_of
 from scalpel_sim.runs.file_names import INITIAL, SCENE, STROKE, grasp_file
+from scalpel_sim.runs.journal import RunPlan
 from scalpel_sim.runs.resumption import RepeatedFrames
 from scalpel_sim.runs.run_checkpoints import RunCheckpoints
 from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_end, write_led
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.runs.run_notes import RunPlan
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene_file.writing import relative_path, scene_text
 from scalpel_sim.scene_parts.scene import Scene

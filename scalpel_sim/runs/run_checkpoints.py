@@ -3,8 +3,7 @@
 from typing import Self
 
 from bridge import InProcessLink
-from scalpel_sim.runs.checkpoint import Checkpoint, CheckpointHead
-from scalpel_sim.runs.checkpoints import Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoint, CheckpointHead, Checkpoints
 from scalpel_sim.runs.file_names import FORCES, REPLAY_FRAMES, STROKE, grasp_file
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.simulation import Simulation

@@ -13,10 +13,8 @@ import numpy as np
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary, summary_json
-from scalpel_sim.recording.file_sum import FileSum
-from scalpel_sim.recording.growing_file import GrowingFile
+from scalpel_sim.recording.growing_file import FileSum, GrowingFile
 from scalpel_sim.recording.recording import COLUMNS, Recording, lines_of_rows
-from scalpel_sim.runs.disk_reserve import DiskReserve
 from scalpel_sim.runs.file_names import (
     ENERGY_PLOT,
     FORCES,
@@ -32,10 +30,9 @@ from scalpel_sim.runs.file_names import (
     SUMMARY,
     grasp_file,
 )
-from scalpel_sim.runs.folder_lock import FolderLock
+from scalpel_sim.runs.journal import RunJournal, RunMark, RunPlan, line_of
+from scalpel_sim.runs.reserved_folder import DiskReserve, FolderLock
 from scalpel_sim.runs.resumption import Resumption
-from scalpel_sim.runs.run_journal import RunJournal
-from scalpel_sim.runs.run_notes import RunMark, RunPlan, line_of
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.frame_log import FrameLog

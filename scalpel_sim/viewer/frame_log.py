@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Self
 import msgspec
 import numpy as np
 
-from scalpel_sim.recording.file_sum import FileSum
-from scalpel_sim.recording.unnamed_file import unnamed_file
+from scalpel_sim.recording.growing_file import FileSum
+from scalpel_sim.recording.row_store import unnamed_file
 from scalpel_sim.viewer.messages import SceneState
 
 _HEAD = struct.Struct("<dqq")

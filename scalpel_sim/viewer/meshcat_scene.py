@@ -7,6 +7,7 @@ sends, over a connection of its own, and the run never waits.
 import logging
 import threading
 from collections.abc import Sequence
+from typing import Generic, TypeVar
 
 import meshcat.geometry as mc
 import numpy as np
@@ -17,7 +18,6 @@ from bridge import TissueFrame
 from scalpel_sim.errors import UsageError
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.newest_message import NewestMessage
 from scalpel_sim.viewer.scene3d import Readings
 from scalpel_sim.viewer.scene_packets import ARROW_LENGTH, TARGET_OPACITY, position_and_rotation
 from tissue import CUT_COLOUR, SKIN_COLOUR, FloatArray, Surface
@@ -32,6 +32,7 @@ HEAD_LENGTH = 0.3
 """Length of the head of the force arrow, over that of the arrow."""
 
 SHAFT_RADIUS = 0.04
+
 HEAD_RADIUS = 0.1
 """Radii of the force arrow, over the length that stands for a newton."""
 
@@ -39,6 +40,8 @@ ARROW_COLOUR = 0xFFB000
 
 SHORTEST_ARROW = 1e-6
 """Length of the arrow of no force [m]: the matrix of one without a length has no inverse."""
+
+_Message = TypeVar("_Message")
 
 
 def expect_visualizer(candidate: object) -> None:
@@ -142,6 +145,34 @@ class _Connection(ViewerWindow):  # type: ignore[misc]
         self.connect_zmq()
         self.zmq_socket.setsockopt(zmq.RCVTIMEO, round(1e3 * PATIENCE))
         self.zmq_socket.setsockopt(zmq.LINGER, 0)  # the end of the process waits for no server
+
+
+class NewestMessage(Generic[_Message]):
+    """Holds the newest message until it is taken. One that comes before replaces it."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._waiting: _Message | None = None
+        self._is_closed = False
+
+    def put(self, message: _Message) -> None:
+        """Leave a message, and return immediately."""
+        with self._changed:
+            self._waiting = message
+            self._changed.notify()
+
+    def take(self) -> _Message | None:
+        """Wait for a message and return it; None when it was closed and holds none."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting is not None or self._is_closed)
+            message, self._waiting = self._waiting, None
+            return message
+
+    def close(self) -> None:
+        """Let the thread that takes know that no more messages come."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
 
 
 def _tissue_geometry(surface: Surface) -> mc.TriangularMeshGeometry:

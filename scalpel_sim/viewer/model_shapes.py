@@ -8,8 +8,7 @@ import numpy as np
 
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.viewer import primitives
-from scalpel_sim.viewer.blade_mesh import blade, edge_in_geom
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
+from scalpel_sim.viewer.primitives import TriangleMesh, blade, edge_in_geom
 from tissue import FloatArray
 
 LAST_VISIBLE_GROUP = 2

@@ -1,18 +1,37 @@
-"""Triangle meshes of MuJoCo's primitive shapes, made by trimesh.
+"""Triangle meshes of MuJoCo's primitive shapes and of blades, made by trimesh.
 
 Round shapes are made at unit radius and scaled, because trimesh drops triangles of less than
 1e-8 m2, which millimetre-sized shapes consist of.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
+import mujoco
 import numpy as np
 
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, IntArray
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s: it is loaded with the first shape
     from trimesh import Trimesh
+
+
+class TriangleMesh(NamedTuple):
+    """A triangle mesh with the vertex attributes that a view needs."""
+
+    positions: FloatArray
+    """Vertex positions [m], shape (n_vertices, 3)."""
+    triangles: IntArray
+    """Vertex indices, counter-clockwise seen from outside, shape (n_triangles, 3)."""
+    normals: FloatArray
+    """Unit vertex normals, shape (n_vertices, 3)."""
+    uv: FloatArray | None = None
+    """Texture coordinates in repeats of the texture, shape (n_vertices, 2)."""
+    tints: FloatArray | None = None
+    """Factors of the colour between 0 and 1, shape (n_vertices, 3)."""
+    levels: Mapping[str, IntArray] = {}
+    """Quantities that may be shown as colours, from 0 to 255, by name; shape (n_vertices,) each."""
+
 
 _N_AROUND = 32
 """Segments around a round shape: at this count its outline looks round on a screen."""
@@ -106,3 +125,60 @@ def _smooth(unit: "Trimesh", scale: FloatArray) -> TriangleMesh:
     normals = unit.vertex_normals / scale
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return TriangleMesh(unit.vertices * scale, unit.faces, normals)
+
+
+_MARGIN = 0.1
+"""Distance by which heel and tip may lie outside the box that stands for the blade, as a fraction
+of its length. A box that they do not fit is another part of the same body."""
+
+#      spine_start ____________ spine_end
+#                 |            \___
+#                 |                \___
+#            heel |____________________\ tip        sharp along heel-tip, no. 11 blade
+#
+SPINE_LENGTH = 0.45
+"""Length of the blunt back of a no. 11 blade up to its slope, in lengths of the edge."""
+
+
+def edge_in_geom(model: mujoco.MjModel, geom: int) -> tuple[FloatArray, FloatArray] | None:
+    """Return heel and tip [m] in a box's frame, if the box is the sheet that carries them."""
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
+    ends = []
+    for name in ("heel", "tip"):
+        site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+        if site < 0 or model.site_bodyid[site] != model.geom_bodyid[geom]:
+            return None
+        ends.append((model.site_pos[site] - model.geom_pos[geom]) @ matrix.reshape(3, 3))
+    heel, tip = ends
+    size = model.geom_size[geom]
+    fits = (np.abs([heel, tip]) <= size + _MARGIN * size.max()).all()
+    is_in_sheet = np.abs(tip - heel).argmax() != size.argmin() and not np.array_equal(heel, tip)
+    return (heel, tip) if fits and is_in_sheet else None
+
+
+def blade(size: FloatArray, heel: FloatArray, tip: FloatArray) -> TriangleMesh:
+    """Return a thin sheet ground to an edge from heel to tip, as wide as the box it stands for.
+
+    Args:
+        size: Half sizes of the box [m]; the least is half the thickness of the sheet.
+        heel: End of the edge nearest the handle [m], in the box's frame.
+        tip: Sharp end [m], in the box's frame.
+    """
+    along = tip - heel
+    across = np.cross(np.eye(3)[np.argmin(size)], along)
+    across /= np.linalg.norm(across)
+    towards_spine = -across if np.dot(across, heel + tip) > 0.0 else across
+    width = 2.0 * float(np.abs(towards_spine) @ size)
+    half = np.cross(along, towards_spine)
+    half *= size.min() / np.linalg.norm(half)
+    spine_start = heel + width * towards_spine
+    spine_end = spine_start + SPINE_LENGTH * along
+    corners = np.array(
+        [heel, tip, spine_start + half, spine_end + half, spine_start - half, spine_end - half]
+    )
+    heel_, tip_, start, end, start_, end_ = range(6)
+    front = [[heel_, tip_, end], [heel_, end, start]]
+    back = [[tip_, heel_, start_], [tip_, start_, end_]]
+    rim = [[start, end, end_], [start, end_, start_], [end, tip_, end_], [heel_, start, start_]]
+    return faceted(corners, np.array(front + back + rim))

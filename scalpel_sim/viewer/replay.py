@@ -11,7 +11,7 @@ import mujoco
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError
-from scalpel_sim.recording.file_sum import FileSum
+from scalpel_sim.recording.growing_file import FileSum
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
 from scalpel_sim.viewer.messages import NO_VALUES, SceneState

@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from scalpel_sim.recording.energy_terms import TERMS
 from scalpel_sim.recording.force_parts import ForceParts
+from scalpel_sim.recording.recording import TERMS
 from scalpel_sim.tables.view import DEFAULT_FOV
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
+from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 
 _EXTENSION = {"uint8": 0x12, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}

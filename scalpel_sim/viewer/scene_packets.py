@@ -8,13 +8,12 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
-from scalpel_sim.viewer.colour_levels import levels_of
 from scalpel_sim.viewer.messages import NO_VALUES
 from scalpel_sim.viewer.model_shapes import Shape
+from scalpel_sim.viewer.primitives import TriangleMesh
 from scalpel_sim.viewer.scene3d import Appearance, Camera, LiveState, Readings, Scene3D
-from scalpel_sim.viewer.texture_mapping import map_texture
-from scalpel_sim.viewer.triangle_mesh import TriangleMesh
-from tissue import FloatArray, Surface, SurfaceQuantity
+from scalpel_sim.viewer.textures import map_texture
+from tissue import FloatArray, IntArray, Surface, SurfaceQuantity
 
 TISSUE = "/tissue"
 """Path of the tissue. Objects below it are in the tissue frame, all others in the world frame."""
@@ -28,9 +27,11 @@ third of the page's height, which leaves room for the stylus."""
 
 CAMERA_ELEVATION = float(np.radians(38.0))
 """Elevation of the camera above the body's centre [rad]."""
+
 CAMERA_AZIMUTHS = np.radians([52.0, 128.0, 232.0, 308.0])
 """Possible azimuths of the camera from the tissue's x axis [rad]. Strokes cut across that axis:
 from these directions one looks into the opening cut and still sees the flat of the blade."""
+
 ARM_AZIMUTH = float(np.radians(80.0))
 """Best angle between the directions from the body to the camera and to the arm, seen from above
 [rad]: from the side the arm neither hides the cut nor is hidden by the body."""
@@ -62,6 +63,7 @@ _WET = {
     "combine": ADD,
 }
 """Properties of the material of wet tissue."""
+
 LIGHT_IN_A_CUT = 0x5A1216
 """Light scattered between the faces of a cut, 0xRRGGBB. Without it a narrow cut looks black."""
 
@@ -73,12 +75,19 @@ _STEEL = {
     "combine": MIX,
 }
 """Properties of the material of the blade."""
+
 _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
 """Properties of the material of painted parts."""
 
-
 OWN_VIEW = "beside the arms"
 """Name of the page's own camera; a scene that has a view of this name replaces it."""
+
+HIGHEST_LEVEL = 255
+"""Level of the top, and of all above it."""
+
+TOP_PERCENTILE = 99.0
+"""Share of the vertices whose values are below the top [%]. In a few around the edge of the blade
+they are so high that all others would have one colour."""
 
 
 class ScenePackets:
@@ -246,3 +255,20 @@ def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, np.ascontiguousarray(pose[3:]))
     return pose[:3], matrix.reshape(3, 3)
+
+
+def levels_of(
+    values: Mapping[SurfaceQuantity, FloatArray],
+) -> tuple[dict[str, IntArray], dict[str, float]]:
+    """Return the levels of quantities, and the value of each for which the highest level stands.
+
+    Values below 0 have level 0, those above the top the highest.
+    """
+    levels: dict[str, IntArray] = {}
+    tops: dict[str, float] = {}
+    for name, array in values.items():
+        top = max(float(np.percentile(array, TOP_PERCENTILE)), 0.0)
+        shares = array / top if top > 0.0 else np.zeros_like(array)
+        levels[name] = np.rint(HIGHEST_LEVEL * np.clip(shares, 0.0, 1.0)).astype(np.int64)
+        tops[name] = top
+    return levels, tops

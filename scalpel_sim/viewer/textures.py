@@ -1,17 +1,25 @@
-"""Textures of living tissue, made of noise: its skin, and the inside that a cut exposes.
+"""Textures of living tissue, and the surface of a body that is mapped to them.
 
 Every texture repeats without a seam in both directions, because its noise is made in Fourier
 space. A colour ramp turns a height field into colours, so that the same picture serves as a bump
 map: dark parts lie deep.
+
+Texture coordinates come from the rest position, so that the pattern moves with the material. Each
+triangle is projected along the axis that is nearest to its normal at rest (a cube map of six
+charts). A vertex that lies in several charts becomes several vertices. A tint that varies in space
+without charts hides the seams between them.
 """
 
 import functools
 import io
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image
 
-from tissue import FloatArray
+from scalpel_sim.viewer.primitives import TriangleMesh
+from tissue import BoolArray, FloatArray, IntArray, Surface
 
 TEXTURE_PIXELS = 512
 """Pixels along each side of a texture; a power of two, as mipmaps need it."""
@@ -25,6 +33,32 @@ ramp and sRGB colour."""
 
 CUT_RAMP = ((0.0, "7a0f14"), (0.35, "b01f22"), (0.65, "d4423c"), (0.9, "ea7a6a"), (1.0, "f6b3a0"))
 """Colours of cut faces from the blood between fibres, red, to bare fibres, pale pink."""
+
+CREASE_COSINE = 0.87
+"""Cosine of 30 degrees. Where the normal of a chart differs by more from the normal of all
+triangles around a vertex, at rest, there is a crease, and its edge is drawn sharp: the edges of a
+box, but not the rim of an organ, whose charts meet at any angle. At 45 degrees boxes would look
+inflated."""
+
+N_CHARTS = 6
+"""Number of charts: the sides of a cube."""
+
+CHART_AXES = np.array([[1, 2], [1, 2], [0, 2], [0, 2], [0, 1], [0, 1]])
+"""Rest coordinates that serve as u and v in the charts that face -x, +x, -y, +y, -z and +z."""
+
+CHART_SHIFT = np.array(
+    [[0.0, 0.0], [0.37, 0.61], [0.71, 0.23], [0.13, 0.47], [0.59, 0.83], [0.29, 0.07]]
+)
+"""Shift of u and v in each chart, so that opposite sides of a body do not show the same pattern."""
+
+N_WAVES = 10
+"""Number of plane waves that add up to the slow variation of the tint."""
+
+TINT_DEPTH = 0.22
+"""Standard deviation of the tint. Without the tint one sees that the texture repeats."""
+
+NO_LEVELS: Mapping[str, IntArray] = {}
+"""No quantities."""
 
 
 @functools.cache
@@ -107,3 +141,110 @@ def _png(height: FloatArray, ramp: tuple[tuple[float, str], ...]) -> bytes:
     file = io.BytesIO()
     image.save(file, format="PNG")
     return file.getvalue()
+
+
+class TexturedSurface(NamedTuple):
+    """A body's surface as two meshes, one for each texture."""
+
+    skin: TriangleMesh
+    """Triangles of the skin."""
+    cut: TriangleMesh
+    """Triangles of the cut faces."""
+
+
+def map_texture(
+    surface: Surface, tile: float, levels: Mapping[str, IntArray] = NO_LEVELS
+) -> TexturedSurface:
+    """Return the skin and the cut faces of a body with texture coordinates, normals and tints.
+
+    Args:
+        surface: Boundary triangles of the body.
+        tile: Length of the material that one repeat of the texture covers [m].
+        levels: Quantities at the vertices of the surface, see `TriangleMesh.levels`.
+    """
+    skin, cut = (
+        _textured_triangles(surface, surface.triangles[chosen], tile, levels)
+        for chosen in (~surface.is_cut, surface.is_cut)
+    )
+    return TexturedSurface(skin, cut)
+
+
+def _textured_triangles(
+    surface: Surface, triangles: IntArray, tile: float, levels: Mapping[str, IntArray]
+) -> TriangleMesh:
+    """Return some triangles of the surface as a mesh of its own."""
+    rest_faces = _area_normals(surface.rest_positions, triangles)
+    axis = np.abs(rest_faces).argmax(axis=1)
+    upward = np.take_along_axis(rest_faces, axis[:, None], axis=1)[:, 0] > 0.0
+    corner_keys = N_CHARTS * triangles + (2 * axis + upward)[:, None]
+    keys, corners = _unique(corner_keys, N_CHARTS * len(surface.positions))
+    node, chart = keys // N_CHARTS, keys % N_CHARTS
+
+    faces = _area_normals(surface.positions, triangles)
+    is_on_crease = _is_on_crease(rest_faces, triangles, corners, node, len(surface.positions))
+    of_chart = _gather(faces, corners, len(keys))
+    of_node = _gather(faces, triangles, len(surface.positions))[node]
+
+    rest = surface.rest_positions[node]
+    return TriangleMesh(
+        positions=surface.positions[node],
+        triangles=corners,
+        normals=_unit(np.where(is_on_crease[:, None], of_chart, of_node)),
+        uv=np.take_along_axis(rest, CHART_AXES[chart], axis=1) / tile + CHART_SHIFT[chart],
+        tints=_tints(rest / tile),
+        levels={name: values[node] for name, values in levels.items()},
+    )
+
+
+def _unique(keys: IntArray, n_keys: int) -> tuple[IntArray, IntArray]:
+    """Return the keys that occur, ascending, and the index of each key among them."""
+    occurs = np.zeros(n_keys, dtype=bool)
+    occurs[keys] = True
+    index = np.cumsum(occurs) - 1
+    found: IntArray = index[keys]
+    return np.flatnonzero(occurs), found
+
+
+def _area_normals(positions: FloatArray, triangles: IntArray) -> FloatArray:
+    """Return the normal of each triangle, twice its area long; shape (n_triangles, 3)."""
+    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
+    normals: FloatArray = np.cross(b - a, c - a)
+    return normals
+
+
+def _is_on_crease(
+    rest_faces: FloatArray, triangles: IntArray, corners: IntArray, node: IntArray, n_nodes: int
+) -> BoolArray:
+    """Return whether each vertex lies on a crease of the body at rest, shape (n_vertices,)."""
+    of_chart = _unit(_gather(rest_faces, corners, len(node)))
+    of_node = _unit(_gather(rest_faces, triangles, n_nodes))[node]
+    creased: BoolArray = np.einsum("ij,ij->i", of_chart, of_node) < CREASE_COSINE
+    return creased
+
+
+def _gather(faces: FloatArray, corners: IntArray, n_vertices: int) -> FloatArray:
+    """Return the sum of the normals of the triangles at each vertex, shape (n_vertices, 3)."""
+    flat = corners.ravel()
+    return np.stack(
+        [np.bincount(flat, np.repeat(faces[:, i], 3), n_vertices) for i in range(3)], axis=1
+    )
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    """Return the vectors at unit length; a zero vector becomes (0, 0, 1)."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
+
+
+def _tints(points: FloatArray) -> FloatArray:
+    """Return a slowly varying tint at points given in tiles, shape (n, 3), between 0 and 1.
+
+    The tint is a sum of plane waves in random directions, so that it has no charts and no seams.
+    """
+    random = np.random.default_rng(7)
+    waves = random.standard_normal((3, N_WAVES)) * 4.0
+    phases = random.uniform(0.0, 2.0 * np.pi, N_WAVES)
+    height = np.sin(points @ waves + phases).sum(axis=1) / np.sqrt(N_WAVES / 2.0)
+    tint = 0.80 + TINT_DEPTH * height[:, None] * np.array([0.55, 0.9, 1.0])
+    clipped: FloatArray = np.clip(tint, 0.0, 1.0)
+    return clipped

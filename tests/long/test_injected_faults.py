@@ -12,9 +12,8 @@ import pytest
 
 from bridge import CouplingError
 from scalpel_sim import SCENES, Simulation, prepare
-from scalpel_sim.arm.arm import ARMS
+from scalpel_sim.arm.arm import ARMS, ArmError
 from scalpel_sim.arm.blade import BladeError
-from scalpel_sim.arm.led_arm import ArmError
 from tests import faults
 from tests.battery import battery
 from tissue import TissueError, Wrench

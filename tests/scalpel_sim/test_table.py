@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare
-from scalpel_sim.instruments.tabletop import TABLETOP
+from scalpel_sim.arm.standing import TABLETOP
 from scalpel_sim.scene_parts.scene import changed
 
 SLAB = changed(SCENES["slab"], table=-1e-4)

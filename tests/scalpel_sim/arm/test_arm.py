@@ -7,8 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from scalpel_sim.arm.arm import ARMS, ASSETS, Arm
-from scalpel_sim.arm.led_arm import ArmError
+from scalpel_sim.arm.arm import ARMS, ASSETS, Arm, ArmError
 from tissue import Wrench
 
 BOTH = pytest.mark.parametrize("preset", ARMS)

@@ -10,7 +10,7 @@ from scalpel_sim import SCENES, prepare
 from scalpel_sim.arm.arm import ARMS, Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.hand import Impedance
-from scalpel_sim.arm.standing_fixture import StandingFixture
+from scalpel_sim.arm.standing import StandingFixture
 
 SIZE = np.array([0.06, 0.2, 0.01])
 

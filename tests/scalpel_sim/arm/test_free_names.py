@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 from msgspec.structs import replace as changed
-from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
 
 from bridge import FixtureMesh
 from scalpel_sim import GrasperTable, WaypointTable, prepare, read_scene
 from scalpel_sim.arm.free_names import free_name, free_prefix, names_in
 from scalpel_sim.arm.grasper import PADS_HEEL, PADS_TIP, GuidedGrasper, add_grasper
 from scalpel_sim.arm.hand import Impedance, add_hand
+from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
 from tests.scalpel_sim.served_scenes import served, untimed
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1e-3]])

@@ -10,7 +10,7 @@ from bridge import CartesianPose
 from scalpel_sim.hands.commands import FARTHEST_MOVE, FARTHEST_TURN
 from scalpel_sim.hands.device_hand import WATCHDOG, DeviceHand
 from scalpel_sim.hands.limited_pose import FARTHEST_AHEAD, MOST_SPEED, MOST_TURN_RATE
-from scalpel_sim.instruments.workspace import ROOM
+from scalpel_sim.instruments.scene_arms import ROOM
 from tests.scalpel_sim.hands.led_runs import DT, ROUNDING, Clock, led, poses
 
 SETTLED = 1e-6

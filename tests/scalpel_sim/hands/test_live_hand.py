@@ -6,14 +6,14 @@ import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
 from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
+from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.limited_pose import (
     ARRIVED,
     FARTHEST_AHEAD,
     MOST_SPEED,
     MOST_TURN_RATE,
 )
-from scalpel_sim.hands.live_hand import LiveHand
-from scalpel_sim.instruments.workspace import ROOM
+from scalpel_sim.instruments.scene_arms import ROOM
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.runs.file_names import FINAL, STROKE

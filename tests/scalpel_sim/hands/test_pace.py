@@ -1,6 +1,6 @@
 import pytest
 
-from scalpel_sim.hands.pace import MOST_BEHIND, Pace
+from scalpel_sim.hands.run_controls import MOST_BEHIND, Pace
 from tests.scalpel_sim.hands.led_runs import Clock
 
 DT = 1e-3

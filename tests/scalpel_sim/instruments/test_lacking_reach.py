@@ -7,18 +7,18 @@ import mujoco
 import numpy as np
 import pytest
 from msgspec.structs import replace as changed
-from tests.scalpel_sim.instruments.test_own_arm import (
-    EXAMPLES,
-    FORWARD,
-    changed_model,
-    scene_with,
-)
 
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim import GrasperTable, WaypointTable, prepare, read_scene
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.instruments.own_arm import move_to_start, own_arm
 from scalpel_sim.strokes.stroke import Stroke
+from tests.scalpel_sim.instruments.test_own_arm import (
+    EXAMPLES,
+    FORWARD,
+    changed_model,
+    scene_with,
+)
 from tissue import BladeSegment
 
 X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)

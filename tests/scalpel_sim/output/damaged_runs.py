@@ -14,8 +14,7 @@ from scalpel_sim.cli.resumed_run import perform_resumed
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.runs.checkpoint import read_checkpoint
-from scalpel_sim.runs.checkpoints import Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
 from scalpel_sim.runs.options import ClientOptions, PrintOptions, RunOutputOptions
 from scalpel_sim.runs.prepared_run import perform_script

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, prepare
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import WALL_TIMES, read_forces
 from scalpel_sim.runs.resumption import resumption_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.runs.checkpoint import read_checkpoint
+from scalpel_sim.runs.checkpoints import read_checkpoint
 from scalpel_sim.runs.file_names import (
     CHECKPOINT_FILES,
     FINAL,

@@ -4,11 +4,10 @@ import resource
 
 import pytest
 
-from scalpel_sim.recording.file_sum import FileSum
-from scalpel_sim.runs.checkpoint import Checkpoint, CheckpointHead, read_checkpoint
-from scalpel_sim.runs.checkpoints import Checkpoints
+from scalpel_sim.recording.growing_file import FileSum
+from scalpel_sim.runs.checkpoints import Checkpoint, CheckpointHead, Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
-from scalpel_sim.runs.run_notes import RunMark, RunPlan
+from scalpel_sim.runs.journal import RunMark, RunPlan
 from tissue import StateError
 
 

@@ -11,8 +11,7 @@ from scalpel_sim import SCENES
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Engage, Release, Undo
 from scalpel_sim.recording.recording import COLUMNS, Recording, read_forces
-from scalpel_sim.runs.checkpoint import read_checkpoint
-from scalpel_sim.runs.checkpoints import Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES, PASSING_FILES, REPLAY_FRAMES
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs

@@ -11,13 +11,18 @@ from matplotlib.image import imread
 from rich.console import Console
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.output.energy_plot import OPACITY, plot_energies
-from scalpel_sim.output.force_plot import HAND_COLOURS, LIMITED, PARTS, plot_forces
 from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.plots import (
+    HAND_COLOURS,
+    LIMITED,
+    OPACITY,
+    PARTS,
+    plot_energies,
+    plot_forces,
+)
 from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_json
-from scalpel_sim.recording.energy_terms import TERMS
-from scalpel_sim.recording.recording import COLUMNS, Recording, columns_of_hand, read_forces
+from scalpel_sim.recording.recording import COLUMNS, TERMS, Recording, columns_of_hand, read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, FORCES, INITIAL, PLOT, SUMMARY
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
 from tests.run_files import names_in

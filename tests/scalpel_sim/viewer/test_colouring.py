@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.viewer.colour_levels import levels_of
 from scalpel_sim.viewer.colouring import Colour, Colouring, Wanted, colour_of, wanted_of
+from scalpel_sim.viewer.scene_packets import levels_of
 
 
 def test_the_run_is_told_where_the_sum_of_what_pages_show_changes():

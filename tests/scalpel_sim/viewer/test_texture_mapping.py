@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.viewer.texture_mapping import map_texture
+from scalpel_sim.viewer.textures import map_texture
 from tests.scalpel_sim.cut_block import cut_block
 from tissue import Surface, liver_lobe
 from tissue.mesh.faces import boundary_faces

@@ -1,12 +1,13 @@
-"""Notes of a run on itself, from which another process can go on with it."""
+"""Journal of a run: its notes on itself, from which another process can continue it."""
 
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
-from scalpel_sim.recording.file_sum import FileSum
+from scalpel_sim.recording.growing_file import FileSum, GrowingFile
 
 _CRC = 8
 """Digits of the checksum of a line."""
@@ -56,6 +57,43 @@ class Noted(NamedTuple):
     """Marks whose checksum holds, in the order in which they were written."""
     ends: list[int]
     """Where in the file the line of each mark ends [bytes]."""
+
+
+class RunJournal:
+    """Notes of a run, with the checksums of its other files. It is written after them.
+
+    Args:
+        path: The file.
+        plan: What the run was asked for.
+        seconds: How long it is to last [s]; None: as long as what a hand does, which leads it.
+        read: Files of recorded motions that it repeats, by path seen from its folder.
+        n_kept: How much is kept of a file that is there [bytes].
+
+    Raises:
+        OSError: the system refuses.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        plan: RunPlan,
+        seconds: float | None,
+        read: Mapping[str, FileSum],
+        n_kept: int = 0,
+    ) -> None:
+        self.plan = plan
+        self._seconds, self._read = seconds, dict(read)
+        self.file = GrowingFile(path, b"", FileSum(n_kept))
+        self.file.append(line_of(plan))
+
+    def mark(self, n_frames: int, written: Mapping[str, FileSum]) -> RunMark:
+        """Return how far the run has got.
+
+        Args:
+            n_frames: Frames that were done.
+            written: Files that grow with the run, by name.
+        """
+        return RunMark(n_frames, self._seconds, dict(written), self._read)
 
 
 def line_of(note: RunPlan | RunMark) -> bytes:

@@ -9,9 +9,9 @@ from scalpel_sim import prepare, read_scene
 from scalpel_sim.arm.grasper import HALF_PAD
 from scalpel_sim.errors import UsageError
 from scalpel_sim.hands.commands import Choose, End, Engage, Jaws, Pause, Release, Undo
+from scalpel_sim.hands.driven_instruments import JAW_SPEED
+from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.limited_pose import MOST_SPEED
-from scalpel_sim.hands.live_grasper import JAW_SPEED
-from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.runs.file_names import FINAL, SCENE, STROKE, grasp_file
