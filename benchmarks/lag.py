@@ -14,7 +14,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 from tests.browser import DETERMINISTIC, NAMES, WINDOW, first_installed
-from tests.scalpel_sim.hands.led_view import LedView
+from tests.scalpel_sim.hands.driven_view import DrivenView
 
 N_MOVES = 400
 SECONDS_PER_MOVE = 0.015
@@ -25,7 +25,7 @@ SETTLING = 2.0
 def main() -> None:
     """Print the times."""
     for scene in sys.argv[1:] or ("grid2", "organ"):
-        with tempfile.TemporaryDirectory() as folder, LedView(scene, Path(folder)) as view:
+        with tempfile.TemporaryDirectory() as folder, DrivenView(scene, Path(folder)) as view:
             lags, pace = lags_in(view.url)
         median, late = (lags[round(share * (len(lags) - 1))] for share in (0.5, 0.99))
         print(f"{scene}: {len(lags)} inputs, median {median:.0f} ms, 99 % {late:.0f} ms; {pace}")

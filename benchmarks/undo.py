@@ -11,8 +11,8 @@ from statistics import median
 
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.hands.commands import Engage, Move, Release, Undo
-from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.run_folder import Outputs
 

@@ -1,9 +1,9 @@
 from .arm.blade import Blade as Blade
 from .arm.grasper import Grasper as Grasper
 from .arm.grasper import add_grasper as add_grasper
+from .instruments.driven_grasper import between_pads as between_pads
 from .instruments.geom_coupling import GeomCoupling as GeomCoupling
 from .instruments.grip import Grip as Grip
-from .instruments.led_grasper import between_pads as between_pads
 from .preparation import prepare as prepare
 from .scene.blade import SCALPEL as SCALPEL
 from .scene_parts.scene import Scene as Scene

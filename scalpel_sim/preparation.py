@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from bridge import Fixture, InProcessLink, TissueLink
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.arm.standing import StandingFixture, Tabletop
@@ -18,7 +18,7 @@ from scalpel_sim.instruments.scene_arms import (
     project_arm_in,
     resting_stroke,
 )
-from scalpel_sim.instruments.scene_graspers import led_graspers, motions_of
+from scalpel_sim.instruments.scene_graspers import driven_graspers, motions_of
 from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
@@ -122,8 +122,8 @@ def _add_graspers(
         arm.blade.body_id,
         *arm.fixtures.values(),
     ]  # the tissue has them already
-    simulation.partners.append(GeomCoupling(arm.data, bridge, without=known))
-    for grasper in led_graspers(graspers, motions, arm, bridge):
+    simulation.coupled_bodies.append(GeomCoupling(arm.data, bridge, without=known))
+    for grasper in driven_graspers(graspers, motions, arm, bridge):
         simulation.add_grasper(grasper)
 
 
@@ -153,7 +153,7 @@ def _warn_of_table(stroke: Stroke, table: Tabletop | None) -> None:
         )
 
 
-def _warn_of_weakness(needed: ExpectedForce, arm: LedArm) -> None:
+def _warn_of_weakness(needed: ExpectedForce, arm: DrivenArm) -> None:
     """Say before the start that an arm cannot do what it is asked to."""
     most = arm.limits.force
     if needed.force > most:

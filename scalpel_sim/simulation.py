@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
-from scalpel_sim.instruments.led_grasper import LedGrasper
+from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.recording.frame_row import FrameRows, WallTimes
 from scalpel_sim.recording.recording import Recording, columns_of_hand, held_columns
@@ -31,7 +31,7 @@ DrawFrame = Callable[["Simulation"], None]
 """Called after each frame, timed as the stage RD: a replay or a live viewer draws it."""
 
 
-class Partner(Protocol):
+class CoupledBody(Protocol):
     """What else acts on the tissue in each frame, and is acted on by it: a grip, a contact."""
 
     def follow(self) -> None:
@@ -41,8 +41,8 @@ class Partner(Protocol):
         """Apply to the model what the tissue did in its step."""
 
 
-class Leader(Protocol):
-    """What leads the hand: a `StrokeFollower`, or somebody by a `LedHand`."""
+class Controller(Protocol):
+    """What leads the hand: a `StrokeFollower`, or somebody by a `Teleoperation`."""
 
     def lead(self, t: float) -> None:
         """Lead the blade to its pose at time `t` [s], a step after the last one."""
@@ -65,7 +65,7 @@ class Simulation:
 
     def __init__(
         self,
-        arm: LedArm,
+        arm: DrivenArm,
         stroke: Stroke,
         link: TissueLink,
         frame: TissueFrame,
@@ -100,9 +100,9 @@ class Simulation:
         self._rows = FrameRows(frame)
         self.recording = Recording(others=held_columns(len(self.bridge.frame_loads)))
         """What happened in each frame so far."""
-        self.graspers: list[LedGrasper] = []
+        self.graspers: list[DrivenGrasper] = []
         """Graspers of other arms: see `add_grasper`."""
-        self.partners: list[Partner] = []
+        self.coupled_bodies: list[CoupledBody] = []
         """What else acts on the tissue, graspers among it."""
         self.workspace: FloatArray | None = None
         """Where a hand may lead the middle of the edge [m], tissue frame: the lowest and the
@@ -123,13 +123,13 @@ class Simulation:
     @stroke.setter
     def stroke(self, stroke: Stroke) -> None:
         self._stroke = stroke
-        self.leader: Leader = StrokeFollower(self.arm.hand, stroke, self.frame)
+        self.controller: Controller = StrokeFollower(self.arm.hand, stroke, self.frame)
         """What leads the blade in each frame."""
 
-    def add_grasper(self, grasper: LedGrasper) -> None:
+    def add_grasper(self, grasper: DrivenGrasper) -> None:
         """Have a grasper of the arm's model take part, before the first frame."""
         self.graspers.append(grasper)
-        self.partners.append(grasper)
+        self.coupled_bodies.append(grasper)
         names = [name for each in self.graspers for name in columns_of_hand(each.name)]
         held = held_columns(self.recording.n_held)
         self.recording = Recording(others=[*held, *names])
@@ -168,19 +168,19 @@ class Simulation:
         """
         start = time.perf_counter()
         arm, blade, now = self.arm, self.arm.blade, self.time
-        self.leader.lead(now)
+        self.controller.lead(now)
         for grasper in self.graspers:
             grasper.lead(now)
         arm.step1()
         arm.check_if_set()  # the tissue is asked only where a blade can be
         self.touching.check()
         segment = blade.segment()
-        for partner in self.partners:
-            partner.follow()
+        for body in self.coupled_bodies:
+            body.follow()
         self.wrench = self._wrench_on(segment)
         blade.apply(self.wrench)
-        for partner in self.partners:
-            partner.apply()
+        for body in self.coupled_bodies:
+            body.apply()
         arm.step2()
         arm.check()
         done = time.perf_counter()

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from bridge import InProcessLink, LedGrip, Proxy, TissueFrame, TissueLink
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
+from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.instruments.grip import Grip
-from scalpel_sim.instruments.led_grasper import LedGrasper
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import Around, FloatArray, Memento, StateError, StateRules, TissueState
@@ -39,7 +39,7 @@ _RULES = StateRules(
     own=frozenset({"Simulation.recording", "Simulation.pictures", "Simulation.wall_seconds"}),
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the
     # stroke that was recorded.
-    unwritten=frozenset({"Simulation.leader", "LedGrasper.leader"}),
+    unwritten=frozenset({"Simulation.controller", "DrivenGrasper.controller"}),
     made={kind.__name__: kind for kind in (Grip, LedGrip, Proxy)},
 )
 """What of arm and bridge is state; the tissue has its own."""
@@ -51,10 +51,10 @@ _CONTENT, _ARM, _WHERE = "simulation", "arm", "places"
 class SavedSimulation(Protocol):
     """A simulation, as far as its state and its settings go; see `simulation.Simulation`."""
 
-    arm: LedArm
+    arm: DrivenArm
     link: TissueLink
     frame: TissueFrame
-    graspers: list[LedGrasper]
+    graspers: list[DrivenGrasper]
     recording: Recording
     coupled: dict[str, str]
     wall_seconds: float

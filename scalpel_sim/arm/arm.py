@@ -45,7 +45,7 @@ class ArmError(RuntimeError):
     """MuJoCo's state can no longer be trusted: the arm must stop."""
 
 
-class LedArm:
+class DrivenArm:
     """An arm, its blade, and the virtual hand that leads it. World frame.
 
     A frame is `step1`, then `blade.segment` and `blade.apply`, then `step2` and `check`.
@@ -233,7 +233,7 @@ class LedArm:
         )
 
 
-class Arm(LedArm):
+class Arm(DrivenArm):
     """A PHANTOM-like arm, its blade, and the virtual hand that leads it. World frame.
 
     Args:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bridge import Collisions, Fixture, FixtureBox
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.collision_geoms import (
     TABLE_THICKNESS,
     WORLD,
@@ -45,7 +45,7 @@ class CollisionMonitor:
 
     MuJoCo has them push each other, and the blade may leave its way: the user gets a warning. It
     says so where nothing pushes, for a model of the user's own may let its geoms pass through each
-    other, and so does a fixture that does not stand in it (`LedArm`).
+    other, and so does a fixture that does not stand in it (`DrivenArm`).
 
     Of parts of two arms those are tested that the blade's instrument may collide with; what else
     of them collides is MuJoCo's answer.
@@ -61,7 +61,7 @@ class CollisionMonitor:
         ValueError: two fixtures have one name.
     """
 
-    def __init__(self, arm: LedArm, fixtures: Iterable[Fixture] = ()) -> None:
+    def __init__(self, arm: DrivenArm, fixtures: Iterable[Fixture] = ()) -> None:
         model, fixtures = arm.model, list(fixtures)
         bodies = {name: model.body(body).id for name, body in arm.fixtures.items()}
         self._arm = arm

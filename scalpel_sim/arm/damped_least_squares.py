@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from tissue import BladeSegment, BoolArray, FloatArray
 
 NEAR_PLACE: Final = 5e-4
@@ -79,7 +79,7 @@ class DampedLeastSquares:
         arm: The arm. The configuration where it is is tried first.
     """
 
-    def __init__(self, arm: LedArm) -> None:
+    def __init__(self, arm: DrivenArm) -> None:
         self._model = arm.model
         self._data = mujoco.MjData(arm.model)
         self._low, self._high = arm.ranges()

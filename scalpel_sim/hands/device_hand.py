@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge import CartesianPose, DeviceState
 from scalpel_sim.hands.commands import FARTHEST_MOVE, FARTHEST_TURN, End
-from scalpel_sim.hands.led_hand import LedHand
+from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.simulation import Simulation
 from tissue import BladeSegment, FloatArray, Wrench
 
@@ -18,13 +18,13 @@ WATCHDOG = 0.04
 a frame of 10 ms, in which an organ is cut, the blade rests within 50 ms."""
 
 
-class DeviceHand(LedHand):
-    """A hand that moves as a stylus has moved since it was engaged; see `LedHand`.
+class DeviceHand(Teleoperation):
+    """A hand that moves as a stylus has moved since it was engaged; see `Teleoperation`.
 
     The tip of the blade stands for the stylus: where that only turns, the tip stays.
 
     Args:
-        simulation: At its start; `leader` is left as it is.
+        simulation: At its start; `controller` is left as it is.
         factor: Returns how fast the simulation runs, over real time.
         listen: Takes what the device has sent, and calls the methods of this hand; called before
             each frame, so that only the device's own silence counts as one.

@@ -21,7 +21,7 @@ from scalpel_sim.hands.commands import (
     Step,
     Undo,
 )
-from scalpel_sim.hands.led_hand import LedHand
+from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state import SimulationState
 
@@ -184,7 +184,7 @@ class RunControls:
         self,
         pace: Pace,
         history: History,
-        hand: LedHand | None = None,
+        hand: Teleoperation | None = None,
         commands: deque[Command] | None = None,
         *,
         sleep: Callable[[float], None] = time.sleep,

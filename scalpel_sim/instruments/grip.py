@@ -41,9 +41,9 @@ class Grip:
         tissue: What it holds: a tissue in this process, or a bridge to one anywhere.
         where: Which points; see `tissue.Tissue.attach`.
         frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
-        stiffness: Of the hold [N/m].
-        damping: Of it [N s/m].
-        breaks_at: Force at which it lets go [N].
+        stiffness: Total stiffness of the attachment [N/m].
+        damping: Total damping of the attachment [N s/m].
+        breaks_at: Force at which it breaks [N].
 
     Raises:
         GripError: the model has no such body.
@@ -72,7 +72,7 @@ class Grip:
         origin = frame.points_to_tissue(self._of_body().position).tolist()
         numbers = {"stiffness": stiffness, "damping": damping, "breaks_at": breaks_at}
         self.attachment: Attachment | LedGrip
-        """The hold, in the frame of the tissue."""
+        """Attachment of the tissue, in its frame."""
         self.attachment = tissue.attach(where, **numbers, origin=origin)
 
     def _of_body(self) -> "_BodyViews":
@@ -101,7 +101,7 @@ class Grip:
         return Wrench(to_world(wrench.force), to_world(wrench.torque), point)
 
     def follow(self) -> None:
-        """Lead the hold to where the body is, at an even speed in the next step."""
+        """Move the attachment to where the body is, at an even speed in the next step."""
         frame, body = self._frame, self._of_body()
         turned = body.axes @ self._axes_at_first.T  # in the world
         rotation = frame.rotation.T @ turned @ frame.rotation
@@ -115,7 +115,7 @@ class Grip:
                 call before stays applied.
         """
         body = self._of_body()
-        try:  # zero after the step in which it let go
+        try:  # zero after the step in which it broke
             now = np.array(about_centre_of_mass(self.wrench, body.centre_of_mass))
         except ValueError as error:
             raise GripError(f"the hold: {error}") from error
@@ -123,7 +123,7 @@ class Grip:
         self._of_grip = now
 
     def release(self) -> None:
-        """Let go."""
+        """Release the tissue."""
         if self.n_points:
             self._tissue.release(self.attachment)  # type: ignore[arg-type]  # it is of this one
         self.apply()

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.placement import PlacementError
@@ -48,7 +48,7 @@ def own_arm(
     tip: str = "tip",
     forward: Sequence[float] = (0.0, 0.0, -1.0),
     others: Sequence[Standing] = (),
-) -> LedArm:
+) -> DrivenArm:
     """Return the arm of an MJCF file, in the configuration of its first keyframe if it has one.
 
     Args:
@@ -62,7 +62,7 @@ def own_arm(
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.
     """
-    led = partial(LedArm, heel=heel, tip=tip, forward=forward)
+    led = partial(DrivenArm, heel=heel, tip=tip, forward=forward)
     try:
         usual = led(own_spec(path), path.stem, limits)
         expect_angles(usual.model)
@@ -117,13 +117,13 @@ def expect_angles(model: mujoco.MjModel) -> None:
         )
 
 
-def _at_first(arm: LedArm) -> FloatArray:
+def _at_first(arm: DrivenArm) -> FloatArray:
     """Return the configuration of the first keyframe, or that of the model without one."""
     first = arm.model.key_qpos[0] if arm.model.nkey else arm.model.qpos0
     return np.asarray(np.clip(first, *arm.ranges()))
 
 
-def firm_impedance(arm: LedArm) -> Impedance:
+def firm_impedance(arm: DrivenArm) -> Impedance:
     """Return a hand that moves this arm as fast as the usual one moves the arms of the scenes.
 
     A robot is a hundred times as heavy at its edge: the usual hand would leave it swinging at 5 Hz.
@@ -161,7 +161,7 @@ def _felt(jacobian: FloatArray, inertia: FloatArray) -> float:
 
 
 def move_to_start(
-    arm: LedArm, stroke: Stroke, frame: TissueFrame, place: PlaceInScene | None = None
+    arm: DrivenArm, stroke: Stroke, frame: TissueFrame, place: PlaceInScene | None = None
 ) -> None:
     """Move an arm to the start of a stroke, all of which it must reach.
 
@@ -185,7 +185,7 @@ def move_to_start(
 
 
 def move_within(
-    arm: LedArm,
+    arm: DrivenArm,
     workspace: FloatArray,
     start: BladeSegment,
     frame: TissueFrame,

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, Fixture, TissueFrame
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.grasper import HALF_PAD, HeldArm
 from scalpel_sim.arm.placement import (
     Placement,
@@ -58,7 +58,7 @@ class ArmSurroundings(NamedTuple):
 class StandingArms(NamedTuple):
     """The arms of a scene at the start."""
 
-    arm: LedArm
+    arm: DrivenArm
     """The one with the blade."""
     frame: TissueFrame
     """Where the tissue lies in its world."""
@@ -199,7 +199,7 @@ def _placed(
 
 
 def _moved(
-    arm: LedArm, stroke: Stroke, frame: TissueFrame, workspace: FloatArray
+    arm: DrivenArm, stroke: Stroke, frame: TissueFrame, workspace: FloatArray
 ) -> FloatArray | None:
     """Move an arm of the user's own to the start, and return where a hand may lead it."""
     if stroke.is_led:
@@ -246,7 +246,7 @@ def _in_world(around: ArmSurroundings, frame: TissueFrame) -> list[Standing]:
     return found if around.table is None else [around.table._replace(frame=frame), *found]
 
 
-def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[LedArm, TissueFrame]:
+def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[DrivenArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world."""
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
     arm = own_arm(

@@ -7,14 +7,14 @@ import mujoco
 import numpy as np
 
 from bridge import Bridge, TissueFrame
-from scalpel_sim.arm.arm import LedArm
+from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.grasper import HeldArm
 from scalpel_sim.arm.placement import AUTO, Placement, covered
-from scalpel_sim.instruments.led_grasper import Hold, LedGrasper
+from scalpel_sim.instruments.driven_grasper import DrivenGrasper, GripSettings
 from scalpel_sim.instruments.second_arm import (
     model_with_grasper,
+    place_of_driven_grasper,
     place_of_grasper,
-    place_of_led_grasper,
     preset_with_grasper,
 )
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
@@ -93,7 +93,7 @@ def arms_with_graspers(
                     motion, boxes, preset, times, table=table, others=taken
                 )
             else:
-                place, spheres, reached = place_of_led_grasper(
+                place, spheres, reached = place_of_driven_grasper(
                     motion,
                     workspace,
                     boxes,
@@ -128,12 +128,12 @@ def _rotation(grasper: GrasperTable) -> FloatArray:
     return axes.reshape(3, 3)
 
 
-def led_graspers(
+def driven_graspers(
     graspers: Sequence[GrasperTable],
     motions: Sequence[GraspMotion],
-    arm: LedArm,
+    arm: DrivenArm,
     bridge: Bridge,
-) -> list[LedGrasper]:
+) -> list[DrivenGrasper]:
     """Return what leads the graspers of a scene.
 
     Args:
@@ -143,16 +143,25 @@ def led_graspers(
         bridge: To the tissue that they may hold.
     """
     return [
-        LedGrasper(grasper, arm.data, motion, bridge, hold=_hold(table), workspace=held.workspace)
+        DrivenGrasper(
+            grasper,
+            arm.data,
+            motion,
+            bridge,
+            settings=_grip_settings(table),
+            workspace=held.workspace,
+        )
         for table, motion, grasper, held in zip(
             graspers, motions, arm.graspers, arm.others, strict=True
         )
     ]
 
 
-def _hold(table: GrasperTable) -> Hold | None:
+def _grip_settings(table: GrasperTable) -> GripSettings | None:
     """Return how a grasper holds what its jaws close on; None: by friction alone."""
     if table.holds == "friction":
         return None
-    given = {name: getattr(table, name) for name in Hold._fields}
-    return Hold()._replace(**{name: value for name, value in given.items() if value is not None})
+    given = {name: getattr(table, name) for name in GripSettings._fields}
+    return GripSettings()._replace(
+        **{name: value for name, value in given.items() if value is not None}
+    )

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
-from scalpel_sim.arm.arm import LedArm, preset_spec, put_base
+from scalpel_sim.arm.arm import DrivenArm, preset_spec, put_base
 from scalpel_sim.arm.grasper import (
     FORWARD,
     GRASPER,
@@ -100,7 +100,7 @@ def place_of_grasper(
     return place, covered(place, path, boxes, times, edge_height=0.0)
 
 
-def place_of_led_grasper(
+def place_of_driven_grasper(
     motion: GraspMotion,
     workspace: FloatArray,
     boxes: FloatArray,
@@ -182,7 +182,7 @@ def model_with_grasper(
     try:
         spec, prefix = with_grasper()
         heel, tip = prefix + PADS_HEEL, prefix + PADS_TIP
-        alone = LedArm(spec, path.stem, DeviceLimits(), heel=heel, tip=tip, forward=FORWARD)
+        alone = DrivenArm(spec, path.stem, DeviceLimits(), heel=heel, tip=tip, forward=FORWARD)
         expect_angles(alone.model)
     except ValueError as error:
         raise UsageError(f"[[grasper]] '{motion.name}' model {path}: {error}") from error

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.instruments.led_grasper import Hold
+from scalpel_sim.instruments.driven_grasper import GripSettings
 from scalpel_sim.output.cut_account import (
     MOST,
     Stretch,
@@ -139,7 +139,7 @@ def _failed_grasp(outcome: RunOutcome) -> Iterator[RunWarning]:
         if outcome.stroke.is_led or table.get("holds") == "friction":
             continue
         opening, holds = recording.column(f"{name}_opening_m"), recording.column(f"{name}_points")
-        is_closed = opening < table.get("closed", Hold().closed)
+        is_closed = opening < table.get("closed", GripSettings().closed)
         if is_closed.any() and not holds.any():
             problem = "closed, and no tissue was between its pads"
             yield RunWarning("empty_grasp", f"the grasper '{name}' {problem}", {"name": name})

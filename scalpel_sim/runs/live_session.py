@@ -12,8 +12,8 @@ from typing import NamedTuple, Self
 from bridge import LinkError
 from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.hands.commands import Begin, Choose, Command, End, Engage, Jaws
-from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.runs.console import SECONDS_PER_CHECK, print_report, say
@@ -157,7 +157,7 @@ class LiveSession:
         assert self._viewer is not None
         prepared, controls = run.prepared, run.controls
         if run.asked.is_led:
-            summary = perform_led(prepared, self._plotter, self._viewer, controls)
+            summary = perform_live(prepared, self._plotter, self._viewer, controls)
         else:
             if self._n_runs == 0:
                 _wait_for_start(self._viewer.url)
@@ -227,7 +227,7 @@ def live_hand(prepared: PreparedRun) -> LiveHand:
     return LiveHand(prepared.simulation, seconds=LONGEST_RUN if seconds is None else seconds)
 
 
-def perform_led(
+def perform_live(
     prepared: PreparedRun, plotter: Plotter, viewer: Viewer, controls: RunControls
 ) -> Summary | None:
     """Do the run from when somebody takes hold of the blade until they end it.

@@ -10,15 +10,15 @@ from msgspec import structs
 
 from bridge import LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
-from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.summary import COMPLETE, Summary
 from scalpel_sim.recording.growing_file import FileSum, sum_of
 from scalpel_sim.runs.file_names import INITIAL, SCENE, STROKE, grasp_file
 from scalpel_sim.runs.journal import RunPlan
 from scalpel_sim.runs.resumption import RepeatedFrames
 from scalpel_sim.runs.run_checkpoints import RunCheckpoints
-from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_end, write_led
+from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene_file.writing import relative_path, scene_text
@@ -158,7 +158,7 @@ def _begin(
     simulation: Simulation,
     outputs: Outputs,
     scene: Scene | None,
-    hand: LedHand | None,
+    hand: Teleoperation | None,
     settings: dict[str, Any],
     seconds: float | None,
 ) -> RunStart:
@@ -231,7 +231,7 @@ def _run_frames(
 
     def write_rows() -> None:
         if hand is not None:
-            write_led(outputs, hand)  # first: from it the rows can be made again
+            write_driven(outputs, hand)  # first: from it the rows can be made again
         outputs.write_forces(simulation.recording, all_rows=True)
 
     def after_frame(now: Simulation) -> bool:
@@ -284,7 +284,7 @@ def _status_of(stopped: str | None, failure: Exception | None, controls: RunCont
     return ENDED_IN_PAGE if is_cut_short else COMPLETE
 
 
-def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
+def _has_rested(simulation: Simulation, hand: Teleoperation) -> bool:
     """Return whether a run has gone on for `REST_AFTER_STROKE` after its hand has ended."""
     if hand.ended_at is None:
         return False
@@ -293,7 +293,9 @@ def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
     return len(simulation.recording) >= n_frames
 
 
-def _scene_to_write(scene: Scene | None, hand: LedHand | None, outputs: Outputs) -> Scene | None:
+def _scene_to_write(
+    scene: Scene | None, hand: Teleoperation | None, outputs: Outputs
+) -> Scene | None:
     """Return the scene that repeats what will have been done."""
     if scene is None or hand is None:
         return scene

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Self
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import RunError, one_line
-from scalpel_sim.hands.led_hand import LedHand
+from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_outcome import outcome_of
 from scalpel_sim.output.run_warnings import RunWarning, warnings_of
@@ -41,7 +41,7 @@ class EndedRun(NamedTuple):
     simulation: Simulation
     outputs: Outputs
     replay: ReplayWriter
-    hand: LedHand | None
+    hand: Teleoperation | None
     """What led the blade, or None for a script."""
     start: RunStart
     settings: dict[str, Any]
@@ -103,7 +103,7 @@ def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
     if run.hand is not None:
         run.hand.finish(simulation.time)
         with attempts.of(_LED):
-            write_led(outputs, run.hand)
+            write_driven(outputs, run.hand)
     with attempts.of(FORCES):
         outputs.write_pending()
     summary = summarise(simulation.recording, _facts(run, attempts))
@@ -125,7 +125,7 @@ def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
     return summary, attempts
 
 
-def write_led(outputs: Outputs, hand: LedHand) -> None:
+def write_driven(outputs: Outputs, hand: Teleoperation) -> None:
     """Write what the hand has done since the last call.
 
     Raises:

@@ -107,7 +107,7 @@ class Outputs:
             self._lock.release()
             raise
         self._n_written = 0 if resumption is None else len(resumption.recorded)
-        self._led: dict[str, GrowingFile] = {}
+        self._driven: dict[str, GrowingFile] = {}
         self._journal: RunJournal | None = None
 
     def path(self, name: str) -> Path:
@@ -179,7 +179,7 @@ class Outputs:
 
     def _written(self) -> dict[str, FileSum]:
         """Return how far `forces.csv` and the files of what a hand did have got."""
-        return {file.path.name: file.sum for file in (self._forces, *self._led.values())}
+        return {file.path.name: file.sum for file in (self._forces, *self._driven.values())}
 
     def _note_rows(self) -> None:
         """Note the rows that are written."""
@@ -210,26 +210,26 @@ class Outputs:
 
     def write_stroke(self, rows: Sequence[Sequence[float]]) -> None:
         """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew."""
-        self._write_led(STROKE, LED_COLUMNS, rows)
+        self._write_driven(STROKE, LED_COLUMNS, rows)
 
     def write_grasp(self, name: str, rows: Sequence[Sequence[float]]) -> None:
         """Add rows of `GRASP_COLUMNS` to the file of a grasper; the first call begins it anew."""
-        self._write_led(grasp_file(name), GRASP_COLUMNS, rows)
+        self._write_driven(grasp_file(name), GRASP_COLUMNS, rows)
 
-    def _write_led(
+    def _write_driven(
         self, name: str, columns: Sequence[str], rows: Sequence[Sequence[float]]
     ) -> None:
         """Add rows to a file of what a hand did; the first call begins it anew.
 
         Numbers are written so that reading them gives the same bits.
         """
-        if name not in self._led:
-            self._led[name] = self._growing(name, columns)
-        _append(self._led[name], lines_of_rows(np.array(rows)) if rows else b"")
+        if name not in self._driven:
+            self._driven[name] = self._growing(name, columns)
+        _append(self._driven[name], lines_of_rows(np.array(rows)) if rows else b"")
 
     def write_pending(self) -> None:
         """Add what the system refused before to `forces.csv` and the files of what a hand did."""
-        for file in (self._forces, *self._led.values()):
+        for file in (self._forces, *self._driven.values()):
             _append(file, b"")
 
     def mark(self) -> FilesMark:
@@ -240,7 +240,7 @@ class Outputs:
     def _growing_files(self) -> list[GrowingFile]:
         """The files that grow: first the journal, which is never to note more than they hold."""
         noted = [] if self._journal is None else [self._journal.file]
-        return [*noted, self._forces, *self._led.values()]
+        return [*noted, self._forces, *self._driven.values()]
 
     def cut_back(self, mark: FilesMark) -> None:
         """Take off what was written to these files after a mark.

@@ -6,8 +6,8 @@ from typing import get_args
 
 import numpy as np
 
-from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.recording.force_parts import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.viewer.model_shapes import body_poses
@@ -133,7 +133,7 @@ def live_state(controls: RunControls) -> LiveState:
     return LiveState(run, None if hand is None else _state_of_hand(hand))
 
 
-def _state_of_hand(hand: LedHand) -> HandState:
+def _state_of_hand(hand: Teleoperation) -> HandState:
     """Return how a hand is, for the page that leads it."""
     return HandState(
         hand.tip,

@@ -22,7 +22,7 @@ from bridge import LinkError, TcpLink
 from scalpel_sim import SCENES, Simulation, Viewer, prepare
 from scalpel_sim.bench.random_strokes import random_stroke
 from scalpel_sim.hands.commands import Engage, Move, Turn
-from scalpel_sim.hands.led_hand import LiveHand
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.viewer.pictures import into_viewer
 from tests.long.child import memory_of_this_process

@@ -16,7 +16,7 @@ from scalpel_sim import Viewer
 from scalpel_sim.errors import RunError
 from scalpel_sim.viewer.messages import PageControls
 from scalpel_sim.viewer.model_shapes import body_poses
-from tests.scalpel_sim.hands.led_view import token_in
+from tests.scalpel_sim.hands.driven_view import token_in
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 

@@ -191,7 +191,7 @@ def test_links_of_the_two_arms_stay_apart_on_their_whole_ways(scene):
 def still(simulation):
     """A tissue that does nothing: only the arms move."""
     result = simulation.link.tissue.step(None, simulation.dt)
-    simulation.partners.clear()
+    simulation.coupled_bodies.clear()
     return lambda sweep, dt, *led: result
 
 

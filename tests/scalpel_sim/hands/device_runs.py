@@ -14,7 +14,7 @@ from scalpel_sim.runs.device_run import DeviceRun, device_run
 from scalpel_sim.runs.options import DeviceOptions
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.scene_parts.scene import changed
-from tests.scalpel_sim.hands.led_runs import GRID2
+from tests.scalpel_sim.hands.driven_runs import GRID2
 
 PERIOD = 1e-3
 """Period of the fake device [s]."""
@@ -46,7 +46,7 @@ class WatchedRun:
         self.simulation, self.led = prepared.simulation, led
         self.frames: list[FrameSeen] = []
         self.address = led.server.address
-        self.simulation.leader = led.hand
+        self.simulation.controller = led.hand
 
     def run(self, seconds: float) -> None:
         """Do frames of so many simulated seconds at real-time speed."""

@@ -11,7 +11,7 @@ from scalpel_sim.hands.commands import FARTHEST_MOVE, FARTHEST_TURN
 from scalpel_sim.hands.device_hand import WATCHDOG, DeviceHand
 from scalpel_sim.hands.limited_pose import FARTHEST_AHEAD, MOST_SPEED, MOST_TURN_RATE
 from scalpel_sim.instruments.scene_arms import ROOM
-from tests.scalpel_sim.hands.led_runs import DT, ROUNDING, Clock, led, poses
+from tests.scalpel_sim.hands.driven_runs import DT, ROUNDING, Clock, led, poses
 
 SETTLED = 1e-6
 """How near the blade comes to the pose that is wanted [m]."""

@@ -10,8 +10,8 @@ from scalpel_sim.arm.grasper import HALF_PAD
 from scalpel_sim.errors import UsageError
 from scalpel_sim.hands.commands import Choose, End, Engage, Jaws, Pause, Release, Undo
 from scalpel_sim.hands.driven_instruments import JAW_SPEED
-from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.limited_pose import MOST_SPEED
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.runs.file_names import FINAL, SCENE, STROKE, grasp_file
@@ -19,7 +19,7 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE, perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
-from tests.scalpel_sim.hands.led_runs import PERIOD, Clock, controls_of, led, move, turn
+from tests.scalpel_sim.hands.driven_runs import PERIOD, Clock, controls_of, led, move, turn
 
 SHEET = read_scene(Path(__file__).parent / "sheet.toml")
 

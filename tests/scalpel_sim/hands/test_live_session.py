@@ -8,7 +8,7 @@ import pytest
 
 from scalpel_sim import read_scene
 from scalpel_sim.runs.file_names import SCENE, STROKE, SUMMARY
-from tests.scalpel_sim.hands.led_view import LedView, LiveView, document, page_of, token_in
+from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView, document, page_of, token_in
 from tissue import MATERIALS
 
 pytestmark = pytest.mark.end_to_end
@@ -72,7 +72,7 @@ def test_a_script_that_is_watched_gives_way_to_a_hand(tmp_path):
 
 
 def test_a_run_that_nobody_has_led_leaves_no_files(tmp_path):
-    with LedView("grid2", tmp_path / "out") as view:
+    with DrivenView("grid2", tmp_path / "out") as view:
         asyncio.run(say(view, begin(scene="grid7")))
         view.wait_for_files()
     assert (

@@ -1,7 +1,7 @@
 import pytest
 
 from scalpel_sim.hands.run_controls import MOST_BEHIND, Pace
-from tests.scalpel_sim.hands.led_runs import Clock
+from tests.scalpel_sim.hands.driven_runs import Clock
 
 DT = 1e-3
 

@@ -9,7 +9,7 @@ from scalpel_sim.hands.run_controls import FRAMES_PER_STEP
 from scalpel_sim.recording.recording import COLUMNS, read_forces
 from scalpel_sim.runs.file_names import FINAL, FORCES, REPLAY, STROKE, SUMMARY
 from scalpel_sim.scene_parts.scene import changed
-from tests.scalpel_sim.hands.led_runs import GRID2, controls_of, done, led, move
+from tests.scalpel_sim.hands.driven_runs import GRID2, controls_of, done, led, move
 
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
@@ -118,17 +118,17 @@ def test_what_was_undone_is_in_no_file_and_a_run_of_the_record_has_the_same_bits
             controls.commands += script.pop(0)[1]
 
     controls.commands += script.pop(0)[1]
-    led_folder, again = tmp_path / "led", tmp_path / "again"
-    done(simulation, led_folder, seconds=10.0, every_frame=every_frame, controls=controls)
-    repeated = prepare(changed(SCENE, stroke=str(led_folder / STROKE)))
+    driven_folder, again = tmp_path / "led", tmp_path / "again"
+    done(simulation, driven_folder, seconds=10.0, every_frame=every_frame, controls=controls)
+    repeated = prepare(changed(SCENE, stroke=str(driven_folder / STROKE)))
     done(repeated, again)
-    assert (led_folder / FINAL).read_bytes() == (again / FINAL).read_bytes()
-    rows = [read_forces(folder / FORCES).rows[:, :UNTIMED] for folder in (led_folder, again)]
+    assert (driven_folder / FINAL).read_bytes() == (again / FINAL).read_bytes()
+    rows = [read_forces(folder / FORCES).rows[:, :UNTIMED] for folder in (driven_folder, again)]
     assert np.array_equal(*rows, equal_nan=True)
-    times = np.loadtxt(led_folder / STROKE, delimiter=",", skiprows=1)[:, 0]
+    times = np.loadtxt(driven_folder / STROKE, delimiter=",", skiprows=1)[:, 0]
     assert (np.diff(times) > 0.0).all() and not script
-    assert (led_folder / REPLAY).read_text().count('class="packet"') > 10
-    assert json.loads((led_folder / SUMMARY).read_text())["status"] == "complete"
+    assert (driven_folder / REPLAY).read_text().count('class="packet"') > 10
+    assert json.loads((driven_folder / SUMMARY).read_text())["status"] == "complete"
 
 
 def test_time_stands_still_and_goes_on_by_steps(run):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.browser import new_tab
-from tests.scalpel_sim.hands.led_view import LedView, LiveView
-from tests.scalpel_sim.hands.test_led_page import drag, tip, until_it_rests
+from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView
+from tests.scalpel_sim.hands.test_driven_page import drag, tip, until_it_rests
 
 pytestmark = pytest.mark.end_to_end
 
@@ -68,7 +68,7 @@ def test_a_reset_takes_a_scripted_run_back_to_its_start(scripted):
 
 @pytest.mark.browser
 def test_a_stroke_is_undone_in_the_page(tmp_path, browser):
-    with LedView("grid2", tmp_path / "led") as view:
+    with DrivenView("grid2", tmp_path / "led") as view:
         tab = new_tab(browser)
         tab.goto(view.url)
         tab.wait_for_function("hand.isClosed")

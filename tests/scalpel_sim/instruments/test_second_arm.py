@@ -15,12 +15,12 @@ from bridge import TissueFrame
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.placement import PlacementError, covered, place
 from scalpel_sim.errors import UsageError
-from scalpel_sim.instruments.led_grasper import LedGrasper
+from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.instruments.second_arm import (
     model_with_grasper,
     path_of_grasper,
+    place_of_driven_grasper,
     place_of_grasper,
-    place_of_led_grasper,
     preset_with_grasper,
 )
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
@@ -58,7 +58,7 @@ def misses_of(held, motion=MOTION):
         warnings.simplefilter("error")  # of MuJoCo, that parts of the model contradict each other
         arm = Arm("touch", base_position=(-1.0, 0.0, 0.0), others=[held])
     (grasper,) = arm.graspers
-    led = LedGrasper(grasper, arm.data, motion, Tissue(BODY), FRAME, None)
+    led = DrivenGrasper(grasper, arm.data, motion, Tissue(BODY), FRAME, None)
     wanted = motion.stroke(0.0, 0.01)
     misses = []
     for _ in range(round((motion.duration + 0.05) / arm.model.opt.timestep)):
@@ -138,7 +138,9 @@ ROOM = np.array([[-0.06, -0.06, 0.0], [0.3, 0.12, 0.09]])
 
 def led_preset():
     rest = MOTION.at_rest()
-    place, _, room = place_of_led_grasper(rest, ROOM, BOUNDS, "auto", TIMES, table=-0.05, others=[])
+    place, _, room = place_of_driven_grasper(
+        rest, ROOM, BOUNDS, "auto", TIMES, table=-0.05, others=[]
+    )
     return preset_with_grasper(rest, place, FRAME, workspace=room)
 
 
@@ -166,7 +168,7 @@ def test_an_arm_whose_grasper_a_hand_leads_is_clear_of_the_other_at_the_start():
     at_start = np.zeros(1)
     there = covered(first, stroke, BOUNDS, at_start)
     table = -float(first.tissue_origin[2])
-    _, spheres, _ = place_of_led_grasper(
+    _, spheres, _ = place_of_driven_grasper(
         FROM_LEFT.at_rest(), ROOM, BOUNDS, "auto", at_start, table=table, others=[there]
     )
     apart = np.linalg.norm(spheres.centres[:, :, None] - there.centres[:, None], axis=3)

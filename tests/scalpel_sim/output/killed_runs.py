@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, prepare
-from scalpel_sim.hands.led_hand import LiveHand
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import WALL_TIMES, read_forces
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scenes import read_scene
-from tests.scalpel_sim.hands.led_runs import controls_of, through_the_body
+from tests.scalpel_sim.hands.driven_runs import controls_of, through_the_body
 
 EVERY = 0.1
 """Simulated time between two checkpoints [s]."""

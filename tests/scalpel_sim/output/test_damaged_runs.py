@@ -77,7 +77,7 @@ def folder(tmp_path, killed) -> Path:
 
 
 @pytest.fixture
-def led_folder(tmp_path, led_killed) -> Path:
+def driven_folder(tmp_path, led_killed) -> Path:
     return copied(led_killed, tmp_path / "run")
 
 
@@ -227,34 +227,34 @@ def test_a_run_goes_on_from_what_it_wrote_and_from_nothing_else(tmp_path, killed
     [with_rows(lambda rows: [*rows[:50], *rows[51:]]), half, nothing],
     ids=["a row removed", "half", "empty"],
 )
-def test_a_record_of_a_hand_that_was_damaged_is_refused_by_name(damage, led_folder, resume):
-    change(led_folder / STROKE, damage)
-    before = {path.name: path.read_bytes() for path in led_folder.iterdir()}
+def test_a_record_of_a_hand_that_was_damaged_is_refused_by_name(damage, driven_folder, resume):
+    change(driven_folder / STROKE, damage)
+    before = {path.name: path.read_bytes() for path in driven_folder.iterdir()}
     with pytest.raises(UsageError, match=r"stroke\.csv was changed, damaged or removed"):
-        resume(led_folder)
-    assert {path.name: path.read_bytes() for path in led_folder.iterdir()} == before
+        resume(driven_folder)
+    assert {path.name: path.read_bytes() for path in driven_folder.iterdir()} == before
 
 
-def test_what_follows_after_the_record_of_a_hand_is_not_done(led_folder, led_killed, resume):
-    change(led_folder / STROKE, lambda data: data + data.splitlines(keepends=True)[-1])
-    resume(led_folder)
-    assert (led_folder / STROKE).read_bytes().startswith((led_killed / STROKE).read_bytes())
+def test_what_follows_after_the_record_of_a_hand_is_not_done(driven_folder, led_killed, resume):
+    change(driven_folder / STROKE, lambda data: data + data.splitlines(keepends=True)[-1])
+    resume(driven_folder)
+    assert (driven_folder / STROKE).read_bytes().startswith((led_killed / STROKE).read_bytes())
 
 
 def test_a_led_run_whose_rows_were_damaged_does_all_that_the_hand_did(
-    tmp_path, led_folder, led_killed, resume
+    tmp_path, driven_folder, led_killed, resume
 ):
     undamaged = copied(led_killed, tmp_path / "undamaged")
-    change(led_folder / FORCES, with_cell(60, "force_x_n", WRONG))
-    for folder in (undamaged, led_folder):
+    change(driven_folder / FORCES, with_cell(60, "force_x_n", WRONG))
+    for folder in (undamaged, driven_folder):
         resume(folder)
-    assert np.array_equal(physics(led_folder), physics(undamaged), equal_nan=True)
+    assert np.array_equal(physics(driven_folder), physics(undamaged), equal_nan=True)
     for name in (FINAL, REPLAY, SCENE, STROKE):
-        assert (led_folder / name).read_bytes() == (undamaged / name).read_bytes(), name
+        assert (driven_folder / name).read_bytes() == (undamaged / name).read_bytes(), name
 
 
 def test_a_hand_rests_once_however_often_its_run_goes_on(
-    tmp_path, led_folder, led_killed, resume, monkeypatch
+    tmp_path, driven_folder, led_killed, resume, monkeypatch
 ):
     def kill(outputs, summary):
         raise Killed
@@ -263,13 +263,13 @@ def test_a_hand_rests_once_however_often_its_run_goes_on(
     resume(once)
     with monkeypatch.context() as killing, pytest.raises(Killed):
         killing.setattr(Outputs, "write_summary", kill)
-        resume(led_folder)
-    for path in checkpoints(led_folder):
+        resume(driven_folder)
+    for path in checkpoints(driven_folder):
         path.unlink()
-    resume(led_folder)
-    assert np.array_equal(physics(led_folder), physics(once), equal_nan=True)
+    resume(driven_folder)
+    assert np.array_equal(physics(driven_folder), physics(once), equal_nan=True)
     for name in (FINAL, REPLAY, SCENE, STROKE):
-        assert (led_folder / name).read_bytes() == (once / name).read_bytes(), name
+        assert (driven_folder / name).read_bytes() == (once / name).read_bytes(), name
 
 
 def test_a_recorded_motion_elsewhere_that_was_changed_is_refused_by_name(

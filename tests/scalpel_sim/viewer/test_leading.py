@@ -11,8 +11,8 @@ from scalpel_sim import Viewer
 from scalpel_sim.hands.commands import LONGEST_SILENCE, Engage, Move, Release
 from scalpel_sim.viewer.leading import MESSAGES_PER_SECOND, MOST_AT_ONCE, Leadership
 from scalpel_sim.viewer.messages import PageControls
-from tests.scalpel_sim.hands.led_runs import Clock
-from tests.scalpel_sim.hands.led_view import page_of, token_in
+from tests.scalpel_sim.hands.driven_runs import Clock
+from tests.scalpel_sim.hands.driven_view import page_of, token_in
 from tests.scalpel_sim.little_arm import FRAME, little_arm
 
 TOKEN = "a-token-that-nobody-guesses"
@@ -143,7 +143,7 @@ def test_only_a_page_of_this_server_with_its_token_may_lead(leading, origin, tok
 
 
 @pytest.fixture
-def led_viewer():
+def driven_viewer():
     commands = deque()
     with Viewer(
         little_arm()[0], frame=FRAME, controls=PageControls(commands, is_led=True)
@@ -173,37 +173,37 @@ def own_origin(viewer) -> str:
     return viewer.url.rstrip("/")
 
 
-def test_a_page_with_the_token_leads_until_it_is_closed(led_viewer):
-    found = heard(led_viewer, own_origin(led_viewer), token_in(led_viewer.url))
+def test_a_page_with_the_token_leads_until_it_is_closed(driven_viewer):
+    found = heard(driven_viewer, own_origin(driven_viewer), token_in(driven_viewer.url))
     assert found == [Engage(), Release()]
 
 
-def test_a_page_without_the_token_is_not_heard(led_viewer):
-    assert heard(led_viewer, own_origin(led_viewer), "") == []
-    assert heard(led_viewer, own_origin(led_viewer), TOKEN) == []
+def test_a_page_without_the_token_is_not_heard(driven_viewer):
+    assert heard(driven_viewer, own_origin(driven_viewer), "") == []
+    assert heard(driven_viewer, own_origin(driven_viewer), TOKEN) == []
 
 
-def test_a_program_that_says_no_origin_is_not_heard(led_viewer):
-    assert heard(led_viewer, None, token_in(led_viewer.url)) == []
+def test_a_program_that_says_no_origin_is_not_heard(driven_viewer):
+    assert heard(driven_viewer, None, token_in(driven_viewer.url)) == []
 
 
-def test_a_page_of_another_origin_opens_no_socket(led_viewer):
+def test_a_page_of_another_origin_opens_no_socket(driven_viewer):
     with pytest.raises(HTTPClientError) as refused:
-        heard(led_viewer, "http://evil.example", token_in(led_viewer.url))
+        heard(driven_viewer, "http://evil.example", token_in(driven_viewer.url))
     assert refused.value.code == 403
 
 
-def test_the_hand_lets_go_when_the_viewer_is_killed(led_viewer):
-    led_viewer._process.kill()
+def test_the_hand_lets_go_when_the_viewer_is_killed(driven_viewer):
+    driven_viewer._process.kill()
     end = time.monotonic() + PATIENCE
-    while not led_viewer.commands:
+    while not driven_viewer.commands:
         assert time.monotonic() < end
         time.sleep(0.02)
-    assert list(led_viewer.commands) == [Release()]
+    assert list(driven_viewer.commands) == [Release()]
 
 
-def test_no_other_page_shows_this_one_in_a_frame(led_viewer):
-    with urllib.request.urlopen(led_viewer.url) as answer:
+def test_no_other_page_shows_this_one_in_a_frame(driven_viewer):
+    with urllib.request.urlopen(driven_viewer.url) as answer:
         assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
         assert answer.headers["X-Frame-Options"] == "DENY"
 

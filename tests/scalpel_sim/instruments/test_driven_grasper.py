@@ -17,8 +17,8 @@ from scalpel_sim.arm.grasper import (
     add_grasper,
 )
 from scalpel_sim.arm.hand import Impedance, add_hand
+from scalpel_sim.instruments.driven_grasper import DrivenGrasper, GripSettings, between_pads
 from scalpel_sim.instruments.geom_coupling import GeomCoupling
-from scalpel_sim.instruments.led_grasper import Hold, LedGrasper, between_pads
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
 from tissue import Material, SolverSettings, Tissue, block
 
@@ -52,7 +52,7 @@ def rows(*given):
     return GraspMotion([Waypoint(t, (0.0, 0.0, z), UP, X, gap) for t, z, gap in given], "left")
 
 
-def led(motion, tissue, frame=TissueFrame(), hold=Hold(closed=0.008), force=None):
+def led(motion, tissue, frame=TissueFrame(), settings=GripSettings(closed=0.008), force=None):
     """A grasper on a gantry, at the start of its motion."""
     spec = mujoco.MjSpec.from_string(GANTRY)
     add_grasper(spec, "arm", force=force)
@@ -65,7 +65,7 @@ def led(motion, tissue, frame=TissueFrame(), hold=Hold(closed=0.008), force=None
     mujoco.mj_forward(model, data)
     grasper = GuidedGrasper(model, data)
     grasper.hold()
-    return LedGrasper(grasper, data, motion, tissue, frame, hold)
+    return DrivenGrasper(grasper, data, motion, tissue, frame, settings)
 
 
 def run(hand, tissue, seconds, *others):
@@ -174,10 +174,12 @@ def test_it_takes_what_is_there_each_time_it_closes():
     assert hand.n_points > 0 and hand.grip is not first
 
 
-@pytest.mark.parametrize("hold", [Hold(closed=0.008), None], ids=["tied", "by friction"])
-def test_jaws_that_close_on_nothing_say_so_once(hold, caplog):
+@pytest.mark.parametrize(
+    "settings", [GripSettings(closed=0.008), None], ids=["tied", "by friction"]
+)
+def test_jaws_that_close_on_nothing_say_so_once(settings, caplog):
     tissue = hanging()
-    hand = led(rows((0.0, 0.2, 0.007), (0.05, 0.2, 0.0)), tissue, hold=hold)
+    hand = led(rows((0.0, 0.2, 0.007), (0.05, 0.2, 0.0)), tissue, settings=settings)
     run(hand, tissue, 0.2)
     assert hand.n_points == 0
     assert caplog.text.count("the jaws of the grasper 'left' closed, and no tissue was there") == 1
@@ -186,7 +188,11 @@ def test_jaws_that_close_on_nothing_say_so_once(hold, caplog):
 def test_what_is_pulled_harder_than_it_is_held_slips_out_and_that_is_said_once(caplog):
     tissue = hanging()
     weight = tissue.pieces()[0].mass * 9.81
-    hand = led(rows((0.0, 0.005, 0.007)), tissue, hold=Hold(closed=0.008, breaks_at=0.5 * weight))
+    hand = led(
+        rows((0.0, 0.005, 0.007)),
+        tissue,
+        settings=GripSettings(closed=0.008, breaks_at=0.5 * weight),
+    )
     run(hand, tissue, 0.3)
     assert hand.n_points == 0 and np.abs(hand.wrench.force).max() < 1e-12
     assert caplog.text.count("the tissue slipped out of the grasper 'left'") == 1
@@ -198,7 +204,7 @@ def test_friction_holds_what_weighs_less_than_both_pads_press_times_its_coeffici
     tissue = hanging(gravity=9.81)
     weight = tissue.pieces()[0].mass * 9.81
     force = share * weight / (2.0 * 0.6)
-    hand = led(rows((0.0, 0.005, 0.006), (0.01, 0.005, 0.0)), tissue, hold=None, force=force)
+    hand = led(rows((0.0, 0.005, 0.006), (0.01, 0.005, 0.0)), tissue, settings=None, force=force)
     coupling = GeomCoupling(hand._data, tissue, hand.grasper.bodies)
     forces = run(hand, tissue, 0.4, coupling)
     assert hand.n_points == 0

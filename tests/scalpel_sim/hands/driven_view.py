@@ -44,7 +44,7 @@ class LiveView:
         self.process.communicate()
 
 
-class LedView(LiveView):
+class DrivenView(LiveView):
     """A `scalpel-sim view --hand live` in another process."""
 
     def __init__(self, scene, folder, *options):

@@ -6,13 +6,13 @@ import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
 from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
-from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.limited_pose import (
     ARRIVED,
     FARTHEST_AHEAD,
     MOST_SPEED,
     MOST_TURN_RATE,
 )
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.instruments.scene_arms import ROOM
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.recording import COLUMNS
@@ -21,7 +21,7 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
-from tests.scalpel_sim.hands.led_runs import (
+from tests.scalpel_sim.hands.driven_runs import (
     DT,
     GRID2,
     ROUNDING,

@@ -7,8 +7,8 @@ import numpy as np
 
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.hands.commands import Engage, Move, Turn
-from scalpel_sim.hands.led_hand import LiveHand
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
+from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs

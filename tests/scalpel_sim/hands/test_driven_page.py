@@ -10,7 +10,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.recording import COLUMNS, read_forces
 from scalpel_sim.runs.file_names import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from tests.browser import new_tab
-from tests.scalpel_sim.hands.led_view import LedView
+from tests.scalpel_sim.hands.driven_view import DrivenView
 
 pytestmark = pytest.mark.end_to_end
 
@@ -49,7 +49,7 @@ LAID_BARE = """() => {
 
 @pytest.fixture
 def view(tmp_path, request, browser):
-    with LedView(request.param, tmp_path / "led") as led:
+    with DrivenView(request.param, tmp_path / "led") as led:
         yield led
     for context in browser.contexts:  # a page that is left open would lead the next run
         context.close()

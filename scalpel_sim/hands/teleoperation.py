@@ -24,7 +24,7 @@ from scalpel_sim.simulation import Simulation
 from tissue import FloatArray
 
 
-class LedHand(abc.ABC):
+class Teleoperation(abc.ABC):
     """Leads blade and graspers towards wanted poses, in place of their scripts.
 
     They start at rest, the blade is chosen, and nothing is held. Whoever leads says how to move
@@ -72,9 +72,9 @@ class LedHand(abc.ABC):
 
     def take_over(self, simulation: Simulation) -> None:
         """Lead the instruments of the simulation that it was made for, from its next frame on."""
-        simulation.leader = self
+        simulation.controller = self
         for grasper, live in zip(simulation.graspers, self.graspers, strict=True):
-            grasper.leader = live
+            grasper.controller = live
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -138,8 +138,8 @@ def _live_graspers(simulation: Simulation) -> tuple[LiveGrasper, ...]:
     return tuple(found)
 
 
-class LiveHand(LedHand):
-    """A hand that obeys the commands of a page; see `LedHand`."""
+class LiveHand(Teleoperation):
+    """A hand that obeys the commands of a page; see `Teleoperation`."""
 
     def _obey(self) -> bool:
         """Do what the commands say; return whether one of them ends the run."""

@@ -9,8 +9,8 @@ import pytest
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import FORCES
 from tests.browser import TIMEOUT, WINDOW
-from tests.scalpel_sim.hands.led_view import LedView
-from tests.scalpel_sim.hands.test_led_page import (
+from tests.scalpel_sim.hands.driven_view import DrivenView
+from tests.scalpel_sim.hands.test_driven_page import (
     LAID_BARE,
     assert_a_run_repeats,
     end,
@@ -97,7 +97,7 @@ TILT = """([axis, deflection, least]) => new Promise((done) => {
 
 @pytest.fixture
 def view(tmp_path):
-    with LedView(SHEET, tmp_path / "led") as led:
+    with DrivenView(SHEET, tmp_path / "led") as led:
         yield led
 
 

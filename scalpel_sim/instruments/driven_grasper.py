@@ -1,4 +1,4 @@
-"""A grasper that is led along a motion, and holds what its jaws close on."""
+"""A grasper that is driven along a motion, and grips what its jaws close on."""
 
 import logging
 import math
@@ -32,20 +32,20 @@ _log = logging.getLogger("scalpel_sim")
 _NOTHING_THERE = "the jaws of the grasper '%s' closed, and no tissue was there"
 
 
-class Hold(NamedTuple):
-    """How tissue is tied to a grasper whose jaws have closed on it."""
+class GripSettings(NamedTuple):
+    """Attachment of tissue to a grasper whose jaws have closed on it."""
 
     stiffness: float = 2000.0
-    """Of all springs together [N/m]."""
+    """Total stiffness of its springs [N/m]."""
     damping: float = 2.0
-    """Of all dampers together [N s/m]."""
+    """Total damping of its dampers [N s/m]."""
     breaks_at: float = math.inf
-    """Force at which it slips out [N]."""
+    """Force at which the tissue slips out [N]."""
     closed: float = 0.006
     """Distance between the pads below which they hold what is between them [m]."""
 
 
-class GrasperLeader(Protocol):
+class GrasperController(Protocol):
     """What leads a grasper: a `MotionFollower`, or a person by a `LiveGrasper`."""
 
     def lead(self, t: float) -> None:
@@ -71,7 +71,7 @@ class MotionFollower:
         self._grasper.open_to(self._motion.opening(t))
 
 
-class LedGrasper:
+class DrivenGrasper:
     """A grasper that is led along a motion, and the tissue that it holds.
 
     A frame is `lead`, MuJoCo's `mj_step1`, `follow`, the tissue's step, `apply`, and `mj_step2`.
@@ -82,7 +82,7 @@ class LedGrasper:
         motion: Where it goes, tissue frame; its name is that of the grasper.
         tissue: What it may hold: a tissue in this process, or a bridge to one anywhere.
         frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
-        hold: How it is tied to what it closes on; None: it is not, and friction alone holds.
+        settings: Attachment to what it closes on; None: there is none, and friction alone holds.
         workspace: Where a person may lead it: see `HeldArm.workspace`.
     """
 
@@ -93,7 +93,7 @@ class LedGrasper:
         motion: GraspMotion,
         tissue: Tissue | Bridge,
         frame: TissueFrame = TissueFrame(),
-        hold: Hold | None = Hold(),
+        settings: GripSettings | None = GripSettings(),
         workspace: FloatArray | None = None,
     ) -> None:
         self.name = motion.name
@@ -101,14 +101,14 @@ class LedGrasper:
         self.motion = motion
         self.grip: Grip | None = None
         """What ties tissue to it now; None while it holds none."""
-        self._data, self._tissue, self._hold = data, tissue, hold
+        self._data, self._tissue, self._settings = data, tissue, settings
         self._frame = frame = frame_of(tissue, frame)
         self._was_closed = False
         self._had_met = False
-        self._holds_some = False
+        self._settingss_some = False
         self.workspace = workspace
         """Where a person may lead the middle of the pads [m], shape (2, 3); None: nowhere."""
-        self.leader: GrasperLeader = MotionFollower(grasper, motion, frame)
+        self.controller: GrasperController = MotionFollower(grasper, motion, frame)
         """What leads it in each frame."""
 
     @property
@@ -130,10 +130,10 @@ class LedGrasper:
 
     def lead(self, t: float) -> None:
         """Lead it to its pose and opening at time `t` [s], a step after the last one."""
-        self.leader.lead(t)
+        self.controller.lead(t)
 
     def follow(self) -> None:
-        """Take what the jaws have closed on, or let go where they have opened; lead what is held.
+        """Grip tissue where the jaws have closed, release it where they have opened, and lead it.
 
         It is said where the jaws have closed on nothing, and where what they held slipped out.
 
@@ -141,28 +141,28 @@ class LedGrasper:
             ValueError: the tissue cannot be held; see `tissue.Tissue.attach`.
             LinkError: it is in another process, and did not answer.
         """
-        if self._hold is None:
+        if self._settings is None:
             has_met = self.grasper.opening < _MEETING
             if has_met and not self._had_met:
                 _log.warning(_NOTHING_THERE, self.name)
             self._had_met = has_met
         else:
-            is_closed = self.grasper.opening < self._hold.closed
+            is_closed = self.grasper.opening < self._settings.closed
             if is_closed and not self._was_closed:
-                self._take(self._hold)
+                self._take(self._settings)
             elif self._was_closed and not is_closed:
                 self.release()
             self._was_closed = is_closed
         if self.grip is not None:
             self.grip.follow()
-            if self._holds_some and not self.n_points:
+            if self._settingss_some and not self.n_points:
                 _log.warning(
                     "at %.3f s the tissue slipped out of the grasper '%s': it pulled with more "
                     "than its breaks_at",
                     self._data.time,
                     self.name,
                 )
-        self._holds_some = self.n_points > 0
+        self._settingss_some = self.n_points > 0
 
     def apply(self) -> None:
         """Apply to it what the tissue did in the last step.
@@ -179,7 +179,7 @@ class LedGrasper:
             self.grip.release()
             self.grip = None
 
-    def _take(self, hold: Hold) -> None:
+    def _take(self, settings: GripSettings) -> None:
         """Tie what lies between the pads to the grasper."""
         places = between_pads(self._tissue, self.grasper.pads, self._frame)
         if not len(places):
@@ -191,9 +191,9 @@ class LedGrasper:
             self._tissue,
             places,
             frame=self._frame,
-            stiffness=hold.stiffness,
-            damping=hold.damping,
-            breaks_at=hold.breaks_at,
+            stiffness=settings.stiffness,
+            damping=settings.damping,
+            breaks_at=settings.breaks_at,
         )
 
 

@@ -11,7 +11,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.recording import COLUMNS, read_forces
 from scalpel_sim.runs.file_names import FINAL, FORCES, STROKE, SUMMARY
 from scalpel_sim.runs.run import REST_AFTER_STROKE
-from tests.scalpel_sim.hands.led_view import LedView, page_of, token_in
+from tests.scalpel_sim.hands.driven_view import DrivenView, page_of, token_in
 
 pytestmark = pytest.mark.end_to_end
 
@@ -44,7 +44,7 @@ async def lead_until(view, stroke, n_rows):
 
 def test_a_stroke_that_was_led_for_some_seconds_is_repeated_by_name_to_the_bit(tmp_path):
     led, again = tmp_path / "led", tmp_path / "again"
-    with LedView("grid2", led, "--seconds", str(SECONDS)) as view:
+    with DrivenView("grid2", led, "--seconds", str(SECONDS)) as view:
         asyncio.run(lead(view))
     summary = json.loads((led / SUMMARY).read_text())
     assert summary["status"] == "complete"
@@ -58,7 +58,7 @@ def test_a_stroke_that_was_led_for_some_seconds_is_repeated_by_name_to_the_bit(t
 
 
 def test_a_scripted_run_keeps_the_stroke_that_it_repeats(tmp_path):
-    with LedView("grid2", tmp_path, "--seconds", "0.2") as view:
+    with DrivenView("grid2", tmp_path, "--seconds", "0.2") as view:
         asyncio.run(lead(view))
     stroke = (tmp_path / STROKE).read_bytes()
     assert command_line(["run", str(tmp_path / "scene.toml"), "-q", "--out", str(tmp_path)]) == 0
@@ -67,7 +67,7 @@ def test_a_scripted_run_keeps_the_stroke_that_it_repeats(tmp_path):
 
 def test_a_led_run_that_was_killed_goes_on_as_a_run_of_what_the_hand_had_done(tmp_path):
     led, again = tmp_path / "led", tmp_path / "again"
-    with LedView("grid2", led, "--checkpoint", "0.1") as view:
+    with DrivenView("grid2", led, "--checkpoint", "0.1") as view:
         asyncio.run(lead_until(view, led / STROKE, n_rows=300))
         view.process.kill()
     assert not (led / FINAL).exists()
@@ -83,7 +83,7 @@ def test_a_led_run_that_was_killed_goes_on_as_a_run_of_what_the_hand_had_done(tm
 
 
 def test_an_interrupted_run_that_waits_for_a_hand_ends(tmp_path):
-    with LedView("grid2", tmp_path) as view:
+    with DrivenView("grid2", tmp_path) as view:
         view.process.send_signal(signal.SIGINT)
         view.line_with("interrupted")
         assert view.process.wait(timeout=30) == 1
