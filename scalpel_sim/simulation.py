@@ -32,7 +32,7 @@ DrawFrame = Callable[["Simulation"], None]
 
 
 class CoupledBody(Protocol):
-    """What else acts on the tissue in each frame, and is acted on by it: a grip, a contact."""
+    """A body that acts on the tissue in each frame, and is acted on by it: a grip, a contact."""
 
     def follow(self) -> None:
         """Be where the model is, before the tissue's step: between MuJoCo's two halves of one."""
@@ -42,7 +42,7 @@ class CoupledBody(Protocol):
 
 
 class Controller(Protocol):
-    """What leads the hand: a `StrokeFollower`, or somebody by a `Teleoperation`."""
+    """Leads the hand in each frame: a `StrokeFollower`, or a person by a `Teleoperation`."""
 
     def lead(self, t: float) -> None:
         """Lead the blade to its pose at time `t` [s], a step after the last one."""
@@ -92,18 +92,18 @@ class Simulation:
             "coupling": repr(coupling),
             "passivity": repr(passivity),
         }
-        """How arm and tissue are coupled, as text."""
+        """Settings of the coupling of arm and tissue, as text."""
         self.wrench = NO_WRENCH
         """Wrench on the blade in the last frame, world frame."""
         self.touching = CollisionMonitor(arm, fixtures)
         """Collisions of the arm with fixtures and with itself."""
         self._rows = FrameRows(frame)
         self.recording = Recording(others=held_columns(len(self.bridge.frame_loads)))
-        """What happened in each frame so far."""
+        """Rows of the frames so far."""
         self.graspers: list[DrivenGrasper] = []
         """Graspers of other arms: see `add_grasper`."""
         self.coupled_bodies: list[CoupledBody] = []
-        """What else acts on the tissue, graspers among it."""
+        """Other bodies that act on the tissue, graspers among them."""
         self.workspace: FloatArray | None = None
         """Where a hand may lead the middle of the edge [m], tissue frame: the lowest and the
         highest place, shape (2, 3); None: the blade follows a script."""
@@ -117,17 +117,17 @@ class Simulation:
 
     @property
     def stroke(self) -> Stroke:
-        """Where the hand leads the blade, tissue frame."""
+        """Path of the blade, tissue frame."""
         return self._stroke
 
     @stroke.setter
     def stroke(self, stroke: Stroke) -> None:
         self._stroke = stroke
         self.controller: Controller = StrokeFollower(self.arm.hand, stroke, self.frame)
-        """What leads the blade in each frame."""
+        """Leads the blade in each frame."""
 
     def add_grasper(self, grasper: DrivenGrasper) -> None:
-        """Have a grasper of the arm's model take part, before the first frame."""
+        """Add a grasper of the arm's model, before the first frame."""
         self.graspers.append(grasper)
         self.coupled_bodies.append(grasper)
         names = [name for each in self.graspers for name in columns_of_hand(each.name)]

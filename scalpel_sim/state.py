@@ -17,7 +17,7 @@ from scalpel_sim.strokes.stroke import Stroke
 from tissue import Around, FloatArray, Memento, StateError, StateRules, TissueState
 
 _SPEC = mujoco.mjtState.mjSTATE_INTEGRATION
-"""What MuJoCo's next step depends on: joints, hand, wrenches, and where its solver ended."""
+"""State of MuJoCo that its next step depends on: joints, hand, wrenches, end of its solver."""
 
 _PLACES = (
     *("xpos", "xquat", "xmat", "xipos", "ximat", "xanchor", "xaxis"),
@@ -42,7 +42,7 @@ _RULES = StateRules(
     unwritten=frozenset({"Simulation.controller", "DrivenGrasper.controller"}),
     made={kind.__name__: kind for kind in (Grip, LedGrip, Proxy)},
 )
-"""What of arm and bridge is state; the tissue has its own."""
+"""Rules of the state of arm and bridge; the tissue has its own."""
 
 _CONTENT, _ARM, _WHERE = "simulation", "arm", "places"
 """Names of arrays beside the tissue's in the bytes of a state: JSON, MuJoCo's state, `_PLACES`."""

@@ -109,7 +109,7 @@ class DrivenArm:
         self.graspers = tuple(
             other.grasper(self.model, self.data, prefix) for other, prefix in held
         )
-        """What these hold."""
+        """Graspers of these arms."""
         self.joints = tuple(
             self.model.joint(i).name or f"joint {i}" for i in range(self.model.njnt)
         )

@@ -55,7 +55,7 @@ class Miss(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """How far an arm followed poses."""
+    """Result of following poses with an arm."""
 
     first: FloatArray
     """Configuration at the first pose, shape (n_joints,)."""

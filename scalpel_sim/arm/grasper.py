@@ -36,7 +36,7 @@ FORWARD = (0.0, 0.0, -1.0)
 jaws. A grasper is led as a blade is."""
 
 _PARTS = ("shaft", *_JAWS)
-"""Its bodies."""
+"""Names of the bodies of a grasper."""
 
 _ALONG_FLANGE = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
 """Rotation that has the shaft, +y, point along +z."""
@@ -60,7 +60,7 @@ class Pads(NamedTuple):
 
 
 def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> str:
-    """Have a body or a site of a model hold a grasper, whose shaft points along its +z.
+    """Attach a grasper to a body or a site of a model, with its shaft along the +z there.
 
     That is how the flanges of robots point. The actuator `grasper_jaws` opens the jaws [m]; where
     the model has one of the names of its parts, all of them get another prefix.
@@ -146,7 +146,7 @@ class Grasper:
         return float(self._jaws[0][0] + self._jaws[1][0])
 
     def open_to(self, opening: float) -> None:
-        """Have the jaws open or close to a distance between the pads [m], with limited force."""
+        """Open or close the jaws to a distance between the pads [m], with limited force."""
         self._control[0] = opening
 
     def put_to(self, opening: float) -> None:
@@ -210,13 +210,13 @@ class HeldArm(NamedTuple):
     name: str
     """Name of the grasper."""
     spec: mujoco.MjSpec
-    """Its model, with the hand that leads the grasper, yet to be compiled."""
+    """Model of the arm with the hand that leads the grasper, yet to be compiled."""
     qpos: FloatArray
-    """Its configuration at the start [rad, m], that of the jaws last."""
+    """Configuration of the arm at the start [rad, m], that of the jaws last."""
     position: FloatArray
     """Where the origin of its model is in the world [m], shape (3,)."""
     quaternion: FloatArray
-    """How it is turned there (w, x, y, z)."""
+    """Rotation of the model there (w, x, y, z)."""
     of_hand: str
     """Prefix of the names of its hand in its model."""
     of_grasper: str = GRASPER

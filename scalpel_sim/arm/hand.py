@@ -35,7 +35,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Impedance:
-    """How firmly the hand holds the blade.
+    """Impedance of the hand at the blade.
 
     The centre of the springs is the middle of the cutting edge, as in Cartesian impedance control
     at the tool's centre point: a force F there moves the blade by F / stiffness and does not turn
@@ -127,7 +127,7 @@ def add_hand(
 
 
 class HandCommand(NamedTuple):
-    """What leads a hand: where it is, and how fast it moves."""
+    """Target of a hand: its place, and its velocity."""
 
     position: FloatArray
     """Where the middle of the edge is to be [m], world frame, shape (3,)."""
@@ -171,7 +171,7 @@ class Hand:
         self.command = HandCommand(
             self._position, self._quaternion, self._control, np.array((of_motion, of_turning))
         )
-        """What leads the hand: views of MuJoCo's arrays."""
+        """Target of the hand: views of MuJoCo's arrays."""
         self._is_held = False
 
     def hold(self, pose: BladeSegment) -> None:
@@ -226,7 +226,7 @@ def lead_to(
     control: FloatArray,
     leads: FloatArray,
 ) -> bool:
-    """Do what `Hand.follow` does; return False, and do nothing, where the pose is not finite.
+    """Follow as `Hand.follow` does; return False, and do nothing, where the pose is not finite.
 
     Args:
         tip: Tip of the blade [m], world frame.

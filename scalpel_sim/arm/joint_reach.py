@@ -1,4 +1,4 @@
-"""How far the parts of an arm can have moved, known from the angles of its joints alone."""
+"""Bounds of how far the parts of an arm have moved, from the angles of its joints alone."""
 
 import math
 from collections.abc import Sequence

@@ -80,7 +80,7 @@ class Places(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a search has found."""
+    """Result of a search."""
 
     place: Places
     """One place."""
@@ -88,7 +88,7 @@ class Found(NamedTuple):
     margin: float
     """Along the path: see `Placement.margin`."""
     score: float
-    """How good it is; not finite where the base cannot stand there."""
+    """Score of the place; not finite where the base cannot stand there."""
 
 
 def blade_path(

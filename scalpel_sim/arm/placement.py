@@ -1,4 +1,4 @@
-"""Where to put the arm and the tissue so that the arm reaches a whole stroke."""
+"""Placement of arm and tissue, so that the arm reaches a whole stroke."""
 
 import math
 from collections.abc import Sequence
@@ -127,7 +127,7 @@ def place(
 def place_if_reached(
     stroke: Stroke, boxes: FloatArray, preset: str, *, force: float
 ) -> Placement | None:
-    """Do what `place` does, but return None where no arm reaches: what would help takes long.
+    """Return the place as `place` does, but None where no arm reaches: what would help takes long.
 
     Args:
         stroke: See `place`, as the rest.

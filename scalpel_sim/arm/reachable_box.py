@@ -1,4 +1,4 @@
-"""How much of a workspace an arm reaches: a box around where it starts."""
+"""The part of a workspace that an arm reaches: a box around where it starts."""
 
 from collections.abc import Callable
 from typing import TypeVar

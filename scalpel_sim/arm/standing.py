@@ -62,7 +62,7 @@ class StandingFixture(NamedTuple):
     """A fixture, as it stands in the world."""
 
     fixture: Fixture
-    """Its shape, world frame."""
+    """Shape of the fixture, world frame."""
 
     def stand_in(self, spec: mujoco.MjSpec) -> str:
         """Stand it in the world of a model that is yet to be compiled. It does not move.
@@ -106,7 +106,7 @@ class Tabletop(NamedTuple):
     """A board, as tissue touches it and as it stands in the world."""
 
     geom: Geom
-    """Its shape: a box."""
+    """Shape of the table: a box."""
     centre: FloatArray
     """Where its middle is [m], tissue frame, shape (3,)."""
     frame: TissueFrame = TissueFrame()
@@ -114,7 +114,7 @@ class Tabletop(NamedTuple):
 
     @property
     def bounds(self) -> FloatArray:
-        """Its lowest and highest corner, tissue frame [m], shape (2, 3)."""
+        """Lowest and highest corner of the board, tissue frame [m], shape (2, 3)."""
         half = np.array(self.geom.size)
         return np.stack([self.centre - half, self.centre + half])
 
@@ -145,7 +145,7 @@ class Tabletop(NamedTuple):
 
 
 def collide_as_one_arm(spec: mujoco.MjSpec, there: mujoco.MjSpec) -> None:
-    """Let the bodies of an arm collide with other arms, and with what stands beside it.
+    """Make the bodies of an arm collide with other arms, and with what stands near it.
 
     Of a body those geoms take part that the model lets collide at all; where it lets none, all.
 

@@ -1,4 +1,4 @@
-"""What a page may ask of the hand and of its run: small messages as JSON, checked at the border."""
+"""Commands of a page to the hand and to its run: small messages as JSON, checked at the border."""
 
 import math
 from typing import Annotated
@@ -77,7 +77,7 @@ class Choose(_Message, frozen=True, tag="choose"):
     """Lead another instrument from now on; the hand lets go of the one before."""
 
     instrument: Annotated[int, msgspec.Meta(ge=0)]
-    """Its number: 0 is the blade, the graspers follow in the order of the scene."""
+    """Number of the instrument: 0 is the blade, the graspers follow in the order of the scene."""
 
 
 class Jaws(_Message, frozen=True, tag="jaws"):

@@ -93,7 +93,7 @@ class DeviceHand(Teleoperation):
         super().let_go()
 
     def lose_client(self) -> None:
-        """Let go, as the device has gone."""
+        """Release the blade, as the device has gone."""
         has_led = self._heard_at > -math.inf
         self.let_go()
         self._is_to_end |= self._ends_with_client and has_led
@@ -118,7 +118,7 @@ class DeviceHand(Teleoperation):
         )
 
     def _obey(self) -> bool:
-        """Let go where the device has been silent for too long; return whether that is the end."""
+        """Release the blade after a long silence; return whether the run is to end."""
         self._listen()
         self._is_to_end |= any(isinstance(command, End) for command in self.commands)
         self.commands.clear()  # a page may end the stroke, and leads nothing

@@ -219,7 +219,7 @@ class LiveGrasper:
         self._path.take(self._edge(self._at))
 
     def _move_jaws(self) -> None:
-        """Have the jaws go one frame towards where they are wanted."""
+        """Move the jaws by one frame towards the wanted opening."""
         step = JAW_SPEED * self._dt
         way = self._wanted_opening - self._at.opening
         to = self._wanted_opening if abs(way) <= step else self._at.opening + np.sign(way) * step

@@ -46,7 +46,7 @@ MEASURED_OVER = 0.5
 
 
 class Follower(Protocol):
-    """What has a part of the run so far: a file, a replay."""
+    """A part of the run so far that goes back with it: a file, a replay."""
 
     def mark(self) -> Any:
         """Return how far it has got."""
@@ -60,11 +60,11 @@ class _Moment(NamedTuple):
 
     state: SimulationState
     marks: list[Any]
-    """Of each follower."""
+    """Mark of each follower."""
 
 
 class History:
-    """What a run was at its start, and before each of its last strokes.
+    """States of a run at its start, and before each of its last strokes.
 
     Args:
         simulation: The run, at its start.
@@ -190,7 +190,7 @@ class RunControls:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self.commands: deque[Command] = deque() if commands is None else commands
-        """What the page asks."""
+        """Commands of the page."""
         self.pace, self.history, self.hand = pace, history, hand
         self.is_paused = False
         """Whether time stands still."""
@@ -209,7 +209,7 @@ class RunControls:
         self._numbers_before_stroke: tuple[float, ...] | None = None
 
     def obey(self) -> bool:
-        """Do what the page asks; return whether the run is to wait, and then to ask again."""
+        """Obey the page; return whether the run is to wait, and then to obey again."""
         while self.commands:
             self._do(self.commands.popleft())
         if not self.is_paused:
@@ -247,7 +247,7 @@ class RunControls:
             self._pass_on(End())
 
     def _pass_on(self, command: LeadingCommand) -> None:
-        """Have the hand obey."""
+        """Pass a command on to the hand."""
         if isinstance(command, End):
             self.is_paused, self.has_ended = False, True
         if self.hand is None:
@@ -279,7 +279,7 @@ class RunControls:
         self.on_change()
 
     def _let_go(self) -> None:
-        """Have the hand let go, and forget what it was still to do."""
+        """Release the instrument, and forget the commands that are left."""
         if self.hand is not None:
             self.hand.commands.clear()
             self.hand.let_go()

@@ -47,7 +47,7 @@ class Teleoperation(abc.ABC):
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.commands: deque[LeadingCommand] = deque()
-        """What it is asked to do."""
+        """Commands to be obeyed in the next frame."""
         self.stamp: float | None = None
         """Stamp of the newest command that it has obeyed; None: there was none yet."""
         self.is_engaged = False
@@ -62,13 +62,13 @@ class Teleoperation(abc.ABC):
         self.blade = _live_blade(simulation)
         self.graspers = _live_graspers(simulation)
         self.instruments: tuple[Instrument, ...] = (self.blade, *self.graspers)
-        """What it may choose."""
+        """Instruments that it may choose."""
         self.chosen = 0
         """Which of them it leads."""
 
     @abc.abstractmethod
     def _obey(self) -> bool:
-        """Do what was asked for since the last frame; return whether the run is to end."""
+        """Obey the commands since the last frame; return whether the run is to end."""
 
     def take_over(self, simulation: Simulation) -> None:
         """Lead the instruments of the simulation that it was made for, from its next frame on."""
@@ -110,13 +110,13 @@ class Teleoperation(abc.ABC):
                 instrument.finish(t)
 
     def choose(self, instrument: int) -> None:
-        """Let go, and lead another instrument from now on, if there is one of that number."""
+        """Release the instrument, and lead the one of that number from now on, if there is one."""
         self.let_go()
         if instrument < len(self.instruments):
             self.chosen = instrument
 
     def let_go(self) -> None:
-        """Have the chosen instrument rest where it is."""
+        """Release the chosen instrument: it rests where it is."""
         self.is_engaged = False
         self.instruments[self.chosen].pose.rest()
 
@@ -142,7 +142,7 @@ class LiveHand(Teleoperation):
     """A hand that obeys the commands of a page; see `Teleoperation`."""
 
     def _obey(self) -> bool:
-        """Do what the commands say; return whether one of them ends the run."""
+        """Obey the commands; return whether one of them ends the run."""
         has_ended = False
         while self.commands:
             command = self.commands.popleft()

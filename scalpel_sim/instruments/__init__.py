@@ -1,1 +1,1 @@
-"""What the arms of a scene hold, how it is led, and how it acts on the tissue."""
+"""Instruments: how arms hold and drive them, and how they act on the tissue."""

@@ -46,7 +46,7 @@ class GripSettings(NamedTuple):
 
 
 class GrasperController(Protocol):
-    """What leads a grasper: a `MotionFollower`, or a person by a `LiveGrasper`."""
+    """Leads a grasper in each frame: a `MotionFollower`, or a person by a `LiveGrasper`."""
 
     def lead(self, t: float) -> None:
         """Lead it to its pose and opening at time `t` [s], a step after the last one."""
@@ -100,7 +100,7 @@ class DrivenGrasper:
         self.grasper = grasper
         self.motion = motion
         self.grip: Grip | None = None
-        """What ties tissue to it now; None while it holds none."""
+        """Grip on the tissue now; None while the grasper holds none."""
         self._data, self._tissue, self._settings = data, tissue, settings
         self._frame = frame = frame_of(tissue, frame)
         self._was_closed = False
@@ -109,7 +109,7 @@ class DrivenGrasper:
         self.workspace = workspace
         """Where a person may lead the middle of the pads [m], shape (2, 3); None: nowhere."""
         self.controller: GrasperController = MotionFollower(grasper, motion, frame)
-        """What leads it in each frame."""
+        """Leads the grasper in each frame."""
 
     @property
     def n_points(self) -> int:
@@ -174,7 +174,7 @@ class DrivenGrasper:
             self.grip.apply()
 
     def release(self) -> None:
-        """Let go of what it holds."""
+        """Release the tissue that it holds."""
         if self.grip is not None:
             self.grip.release()
             self.grip = None

@@ -20,9 +20,9 @@ class _BodyViews(NamedTuple):
     """Views of MuJoCo's arrays for one body: they stay valid for the life of its data."""
 
     position: FloatArray
-    """Its origin [m], shape (3,)."""
+    """Origin of the body [m], shape (3,)."""
     axes: FloatArray
-    """Its axes as columns, shape (3, 3)."""
+    """Axes of the body as columns, shape (3, 3)."""
     centre_of_mass: FloatArray
     """[m], shape (3,)."""
     applied: FloatArray

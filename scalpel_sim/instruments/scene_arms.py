@@ -1,4 +1,4 @@
-"""Where the arms of a scene stand in the world: the one with the blade, and those with graspers."""
+"""Places of the arms of a scene in the world: the one with the blade, and those with graspers."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -45,12 +45,12 @@ down beside the body."""
 
 
 class ArmSurroundings(NamedTuple):
-    """What stands around the arms, tissue frame."""
+    """Surroundings of the arms, tissue frame."""
 
     boxes: FloatArray
     """Boxes that no arm may enter [m]: that of the body, and of a table; see `placement.place`."""
     table: Tabletop | None
-    """What the body lies on."""
+    """Table under the body."""
     fixtures: list[Fixture]
     """Rigid bodies, a floor among them."""
 
@@ -63,9 +63,9 @@ class StandingArms(NamedTuple):
     frame: TissueFrame
     """Where the tissue lies in its world."""
     stroke: Stroke
-    """What it does: of a blade of its length."""
+    """Its stroke, for a blade of its length."""
     others: list[Standing]
-    """What stands beside it: arms with graspers, a table, fixtures."""
+    """Other bodies in its world: arms with graspers, a table, fixtures."""
     room: FloatArray | None
     """Where a hand may lead the middle of its edge [m], tissue frame, shape (2, 3); None where a
     script leads it."""

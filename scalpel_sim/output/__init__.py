@@ -1,1 +1,1 @@
-"""What a run records and writes: tables, plots, and the files of its folder."""
+"""Results of a run: summary, warnings, tables, plots and exports."""

@@ -1,4 +1,4 @@
-"""Where along a cut the account does not close: energy that is released, area that is not paid for.
+"""Intervals of a cut whose account does not close: energy released, or area that is not paid for.
 
 Both are looked at over 5 mm of cut and more. The length of a cut is the area that the mesh opened
 over the mean length of edge in the tissue: each row of a recording has both, and unlike the way of

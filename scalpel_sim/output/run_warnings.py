@@ -44,7 +44,7 @@ class RunWarning(NamedTuple):
     """Something that a run was asked for and did not do."""
 
     kind: str
-    """Its name, which stays."""
+    """Name of the kind, which stays."""
     message: str
     """Problem, size and reason, in one line."""
     figures: dict[str, Any]

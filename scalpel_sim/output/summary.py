@@ -106,7 +106,7 @@ class Summary(NamedTuple):
 
 
 class RunFacts(NamedTuple):
-    """What a summary needs beside the recorded frames."""
+    """Facts of a run for its summary, besides the recorded frames."""
 
     scene: str
     status: str

@@ -13,7 +13,7 @@ class FileSum(NamedTuple):
     """The first bytes of a file. It is carried on with what is added, without reading the file."""
 
     n_bytes: int = 0
-    """How many there are."""
+    """Number of these bytes."""
     crc: int = 0
     """Their CRC-32: against damage, not against malice."""
 

@@ -1,4 +1,4 @@
-"""What happened in each frame, as one table of numbers, with the terms of the energy account."""
+"""One row of numbers for each frame, and the terms of the energy account."""
 
 import math
 import re
@@ -132,7 +132,7 @@ class Recording:
         return len(self._store)
 
     def keep_in(self, folder: Path) -> None:
-        """Have the file of what memory does not hold made in a folder, if there is none yet."""
+        """Put the file of what memory does not hold into a folder, if there is none yet."""
         self._store.folder = folder
 
     @property

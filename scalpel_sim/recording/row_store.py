@@ -53,7 +53,7 @@ class RowStore:
 
     @property
     def are_in_memory(self) -> bool:
-        """Whether all rows are."""
+        """Whether all rows are in memory."""
         return self._file is None
 
     def append(self, row: Sequence[float]) -> None:

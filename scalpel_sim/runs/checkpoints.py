@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 
 
 class CheckpointHead(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a checkpoint says beside the state."""
+    """Notes of a checkpoint on its run, besides the state."""
 
     plan: RunPlan
     """Request of the run."""
@@ -141,12 +141,12 @@ class Checkpoints:
 
     @property
     def are_wanted(self) -> bool:
-        """Whether there are to be any."""
+        """Whether there are to be checkpoints."""
         return self._every > 0
 
     @property
     def are_there(self) -> bool:
-        """Whether there is one."""
+        """Whether there is a checkpoint."""
         return self._frames != [None, None]
 
     def is_due(self, n_frames: int) -> bool:
@@ -216,7 +216,7 @@ class Checkpoints:
 
 
 def _put_on_disk(path: Path) -> None:
-    """Have the system write what a file, or the names in a folder, hold by now."""
+    """Flush what a file, or the names in a folder, hold by now to the disk."""
     if not path.exists():
         return
     number = os.open(path, os.O_RDONLY)

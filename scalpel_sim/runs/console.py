@@ -1,4 +1,4 @@
-"""What the command line prints: log lines, the progress bar, the report of a run."""
+"""Printing: log lines, the progress bar, the report of a run."""
 
 import logging
 import math

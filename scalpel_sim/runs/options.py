@@ -99,7 +99,7 @@ class RunOutputOptions(OutputOptions):
 @Parameter(name="*", group=OUTPUT)
 @dataclass(frozen=True)
 class PrintOptions:
-    """What a command prints."""
+    """Options of printing."""
 
     json: Flag = False
     "Print the result as JSON on standard output, and nothing else there."

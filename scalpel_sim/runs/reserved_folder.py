@@ -33,7 +33,7 @@ class FolderLock:
             ) from None
 
     def release(self) -> None:
-        """Let another run have the folder. May be called twice."""
+        """Release the folder for other runs. May be called twice."""
         self._lock.release()
 
 

@@ -1,4 +1,4 @@
-"""What the folder of an interrupted run has, and how a run goes on from there."""
+"""Files of an interrupted run, and how a run continues from there."""
 
 import json
 import logging

@@ -24,7 +24,7 @@ _LED = "what the hands did"
 
 
 class RunStart(NamedTuple):
-    """What is known of a run before its first frame: later the link may be lost."""
+    """Facts of a run before its first frame: later the link may be lost."""
 
     body: TissueDescription
     title: str
@@ -42,7 +42,7 @@ class EndedRun(NamedTuple):
     outputs: Outputs
     replay: ReplayWriter
     hand: Teleoperation | None
-    """What led the blade, or None for a script."""
+    """Teleoperation of the blade; None: a script led it."""
     start: RunStart
     settings: dict[str, Any]
     """Settings to keep in the summary."""

@@ -209,17 +209,17 @@ class Outputs:
         self._note_rows()
 
     def write_stroke(self, rows: Sequence[Sequence[float]]) -> None:
-        """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew."""
+        """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it again."""
         self._write_driven(STROKE, LED_COLUMNS, rows)
 
     def write_grasp(self, name: str, rows: Sequence[Sequence[float]]) -> None:
-        """Add rows of `GRASP_COLUMNS` to the file of a grasper; the first call begins it anew."""
+        """Add rows of `GRASP_COLUMNS` to the file of a grasper; the first call begins it again."""
         self._write_driven(grasp_file(name), GRASP_COLUMNS, rows)
 
     def _write_driven(
         self, name: str, columns: Sequence[str], rows: Sequence[Sequence[float]]
     ) -> None:
-        """Add rows to a file of what a hand did; the first call begins it anew.
+        """Add rows to a file of what a hand did; the first call begins it again.
 
         Numbers are written so that reading them gives the same bits.
         """
@@ -253,7 +253,7 @@ class Outputs:
             _naming_path(file.path, partial(_cut_back, file, mark.grown.get(file.path.name)))
 
     def start_plots(self, title: str) -> None:
-        """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
+        """Start to draw `force.png`, and with an audit `energy.png`, from `forces.csv`."""
         self._plotter.start(self.path(FORCES), title, self.path(PLOT), self.path(ENERGY_PLOT))
 
     def finish_plots(self) -> None:

@@ -93,7 +93,7 @@ class StopSignals:
 
 
 def interrupt_on_signals() -> None:
-    """Have every signal of `SIGNALS` stop the work at once, unless it is ignored.
+    """Stop the work at once on every signal of `SIGNALS`, unless it is ignored.
 
     For a program where nobody waits for a signal. While it loads (`loading`), the process ends with
     one line; afterwards `SignalInterrupt` is raised. An exception that passes through a library

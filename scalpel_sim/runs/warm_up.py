@@ -58,7 +58,7 @@ Progress = Callable[[int, int], None]
 
 
 class KernelSet(NamedTuple):
-    """What decides which kernels a run calls."""
+    """Settings on which the kernels of a run depend."""
 
     law: str = "neo_hookean"
     scheme: str = "stellar"
@@ -254,7 +254,7 @@ def _move_two_pieces(kernels: KernelSet) -> None:
 
 
 def _lead_an_arm() -> None:
-    """Let a hand lead an arm beside any tissue, and compile what a bridge computes in a frame."""
+    """Lead an arm without any tissue, and compile what a bridge computes in a frame."""
     compiled_arithmetic()
     arm = Arm()
     pose = arm.blade.segment()

@@ -25,7 +25,7 @@ class LoggedFrame(NamedTuple):
     begin: int
     """Where it begins in the file [bytes]."""
     n_bytes: int
-    """Its length there."""
+    """Length of the frame there [bytes]."""
 
 
 class FrameLog:
@@ -45,7 +45,7 @@ class FrameLog:
         mode = "r+b" if kept.n_bytes else "w+b"
         self._file = unnamed_file() if path is None else path.open(mode, buffering=0)
         self.sum = kept
-        """Its length and checksum."""
+        """Length and checksum of the file."""
         if self._file.seek(0, 2) < kept.n_bytes:
             raise OSError(f"{path} has fewer than {kept.n_bytes} bytes: a part of it is missing")
         self.cut_back(kept)

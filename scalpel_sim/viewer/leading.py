@@ -81,7 +81,7 @@ class Leadership:
         return is_ours and hmac.compare_digest(token.encode(), self._token.encode())
 
     def add(self, page: LeadingPage) -> None:
-        """Let a page take part."""
+        """Add a page."""
         self._pages[page] = _Allowance(self._clock())
         self._leader = self._leader or page
         self._tell()
@@ -96,7 +96,7 @@ class Leadership:
         self._tell()
 
     def receive(self, page: LeadingPage, message: str | bytes) -> None:
-        """Do what a page says, if it may say it."""
+        """Obey a message of a page, if the page may send it."""
         allowance = self._pages.get(page)
         command = None
         if allowance is not None and allowance.has_room(self._clock()):
@@ -120,7 +120,7 @@ class Leadership:
         return self._leader is None or not self._is_engaged or is_silent
 
     def _tell(self) -> None:
-        """Tell all pages whether they lead."""
+        """Inform all pages whether they lead."""
         for page in list(self._pages):
             page.say(msgspec.json.encode({"leads": page is self._leader}).decode())
 

@@ -169,7 +169,7 @@ class NewestMessage(Generic[_Message]):
             return message
 
     def close(self) -> None:
-        """Let the thread that takes know that no more messages come."""
+        """Inform the thread that takes that no more messages come."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()

@@ -22,7 +22,7 @@ NO_VALUES: Mapping[SurfaceQuantity, FloatArray] = {}
 
 
 class Choices(NamedTuple):
-    """What a page may ask for in the next run, and what this one has."""
+    """Choices of a page for the next run, and those of this one."""
 
     first: str
     """Name of the scene of the command line."""
@@ -41,7 +41,7 @@ class Choices(NamedTuple):
 
 
 class PageControls(NamedTuple):
-    """What a page may do with the run that it shows."""
+    """Controls of a page over the run that it shows."""
 
     commands: deque[Command]
     """Receives its commands."""

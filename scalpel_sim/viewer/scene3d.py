@@ -119,7 +119,7 @@ class RunState(NamedTuple):
 
 
 class LiveState(NamedTuple):
-    """What a page shows of the run that it controls."""
+    """State of a run for the page that controls it."""
 
     run: RunState
     hand: HandState | None = None
@@ -248,7 +248,7 @@ class Scene3D:
         )
 
     def set_scales(self, tops: Mapping[str, float]) -> None:
-        """Say which value of each quantity the level 255 of the meshes before stands for, SI."""
+        """Set the value of each quantity that level 255 of the meshes before stands for, SI."""
         self._add("set_scales", tops=dict(tops))
 
     def set_live(self, live: LiveState) -> None:

@@ -52,7 +52,7 @@ DRAWN = "drawn"
 """Message of a page that has drawn a packet."""
 
 RELOAD = '{"reload":true}'
-"""Message to a page that is to be loaded anew."""
+"""Message to a page that is to be loaded again."""
 
 LAST_STATE_TIMEOUT = 1.0
 """Time for the pages to draw the last state before the process ends [s]."""
@@ -124,7 +124,7 @@ class OpenPages:
         self._pages: set[PageSocket] = set()
 
     def begin(self, packets: ScenePackets) -> None:
-        """Have all pages load anew, to show another run."""
+        """Reload all pages, to show another run."""
         self._packets, self._opening, self._newest = packets, None, None
         for page in list(self._pages):
             page.say(RELOAD)

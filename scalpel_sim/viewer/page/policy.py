@@ -1,4 +1,4 @@
-"""What a page may do, as its browser is told: run its own scripts, and talk to its own server."""
+"""Policy of a page for its browser: it runs its own scripts, and talks to its own server."""
 
 import base64
 import hashlib
