@@ -14,11 +14,10 @@ from bridge.collision.broad_phase import BroadPhase
 from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
 from bridge.coupling.coupling import Coupling, CouplingError, expect_plausible_motion
-from bridge.coupling.impulse import ImpulseCompensation
-from bridge.coupling.leading import Leading, PathPart
-from bridge.coupling.led_bodies import LedBodies, loads_over
+from bridge.coupling.driven_bodies import DrivenBodies, loads_over
+from bridge.coupling.driving import Driving, PathPart
 from bridge.coupling.limits import DeviceLimits
-from bridge.coupling.local_model import MAX_FRAMES_PER_ANSWER, LocalModel
+from bridge.coupling.local_model import MAX_FRAMES_PER_ANSWER, ImpulseCompensation, LocalModel
 from bridge.coupling.passivity import Travel
 from bridge.coupling.query import Query, TimedSweep, TissueAnswer
 from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
@@ -31,12 +30,12 @@ if TYPE_CHECKING:  # the side without the tissue starts without its compiler
     from tissue import Tissue
 
 
-class Bridge(Leading):
+class Bridge(Driving):
     """Carries the blade's motion to the tissue and the tissue's wrench back.
 
-    By default the tissue is asked in each frame, and the arm feels in the next one the wrench
+    By default the tissue is queried in each frame, and the arm feels in the next one the wrench
     averaged over it: the impulse on the arm equals that on the tissue, to the last bit, and the
-    same blade path does the same work on both sides. Where the tissue is asked only every few
+    same blade path does the same work on both sides. Where the tissue is queried only every few
     frames, its last wrench and its local stiffness answer in between: see `LocalModel`.
 
     Args:
@@ -72,8 +71,8 @@ class Bridge(Leading):
     ) -> None:
         if not (tissue_every == int(tissue_every) and 1 <= tissue_every <= MAX_FRAMES_PER_ANSWER):
             raise ValueError(
-                f"the tissue is to be asked every {tissue_every} frames; it must be a whole number "
-                f"from 1 to {MAX_FRAMES_PER_ANSWER}"
+                f"the tissue is to be queried every {tissue_every} frames; it must be a whole "
+                f"number from 1 to {MAX_FRAMES_PER_ANSWER}"
             )
         link = link_to(tissue)
         self._frame = frame
@@ -92,7 +91,7 @@ class Bridge(Leading):
         )
         self._link = link
         self._query = Query(link, waits)
-        self._led = LedBodies(link)
+        self._driven = DrivenBodies(link)
         self._model = LocalModel(tissue_yields=coupling is None)
         self._impulse = ImpulseCompensation()
         self._correction = np.zeros(6)
@@ -102,7 +101,7 @@ class Bridge(Leading):
         # With an answer in each frame the model has nothing to add to the answer itself.
         self._is_direct = waits and tissue_every == 1 and coupling is None
         self._arm: Pose | None = None
-        self._asked_at: Pose | None = None
+        self._queried_at: Pose | None = None
         self._path: list[PathPart] = []
         self._result: StepResult | None = None
         self._raw: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -110,7 +109,7 @@ class Bridge(Leading):
         self._raw_is_felt = True
         self._touching: tuple[str, ...] = ()
         self._answered = False
-        self._holds_as_much = False
+        self._is_anchored_as_before = False
         self._silence = 0.0
         self._n_frames = 0
         self._n_answers = 0
@@ -119,7 +118,7 @@ class Bridge(Leading):
     def step(self, segment: BladeSegment, dt: float) -> Wrench:
         """Advance the tissue by `dt` [s] while the blade moves here from its last pose.
 
-        In the first call the blade has not moved. The tissue is asked in the first call, and then
+        In the first call the blade has not moved. The tissue is queried in the first call, and then
         in every `tissue_every`-th one.
 
         Args:
@@ -176,7 +175,7 @@ class Bridge(Leading):
     def missing_impulse(self) -> FloatArray:
         """Impulse of the tissue that the arm has not felt yet [N s], tissue frame, shape (3,).
 
-        Zero where the tissue is asked in each frame: the arm feels exactly the tissue's impulse.
+        Zero where the tissue is queried in each frame: the arm feels exactly the tissue's impulse.
         """
         return self._impulse.missing[:3]
 
@@ -212,19 +211,19 @@ class Bridge(Leading):
         )
 
     def _advance(self, arm: Pose, dt: float) -> Six:
-        """Let the tissue do this frame, and return its wrench: where it answers in each frame."""
-        before = self._asked_at or arm
-        led = self._led.poses
+        """Advance the tissue by this frame, where it answers in each, and return its wrench."""
+        before = self._queried_at or arm
+        driven = self._driven.poses
         # It stays where a link fails: the next frame then does both.
-        self._path.append(PathPart(arm, dt, led))
+        self._path.append(PathPart(arm, dt, driven))
         touches, self._touching = self._broad_phase.overlaps(
             before, arm, dt, engaged=self._engaged()
         )
         self._n_rejected += not touches
         sweep = BladeSweep(before.segment, arm.segment) if touches else None
-        result = self._query.step(sweep, dt, led)
-        self._asked_at = arm
-        self._led.take(loads_over(self._link), result)
+        result = self._query.step(sweep, dt, driven)
+        self._queried_at = arm
+        self._driven.take(loads_over(self._link), result)
         self._path.clear()
         self._take(result, dt)
         self._answered = True
@@ -233,14 +232,14 @@ class Bridge(Leading):
         return fx, fy, fz, tx, ty, tz
 
     def _consult(self, arm: Pose, dt: float) -> Six:
-        """Ask the tissue where that is due, and return its wrench, or what it may be by now."""
+        """Query the tissue where that is due, and return its wrench, or what it may be by now."""
         balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
         blade = arm if self._proxy is None else pose_of(self._proxy.pose)
-        self._path.append(PathPart(blade, dt, self._led.poses))
+        self._path.append(PathPart(blade, dt, self._driven.poses))
         query = self._query
-        is_due = self._asked_at is None or len(self._path) >= self._tissue_every
+        is_due = self._queried_at is None or len(self._path) >= self._tissue_every
         if is_due and not query.is_pending:
-            self._ask()
+            self._start_query()
         answer = query.take_answer()
         if answer is not None:
             self._process(answer)
@@ -252,7 +251,7 @@ class Bridge(Leading):
         return raw
 
     def _follow(self, coupling: VirtualCoupling, arm: Pose, dt: float) -> Six:
-        """Let the proxy follow the arm, and return the tissue's wrench on both."""
+        """Move the proxy after the arm, and return the tissue's wrench on both."""
         if self._proxy is None:
             self._proxy = Proxy(coupling, dt, arm.segment)
         proxy, model = self._proxy, self._model
@@ -260,8 +259,8 @@ class Bridge(Leading):
         self._correction = self._impulse.correction(wrench, proxy.pose, dt)
         return six(proxy.follow(arm.segment, wrench + self._correction, model.stiffness, dt))
 
-    def _ask(self) -> None:
-        """Ask the tissue to advance to the present, while the blade moves along its path.
+    def _start_query(self) -> None:
+        """Query the tissue to advance to the present, while the blade moves along its path.
 
         A blade that already holds tissue moves on a straight line, except in the last frame: the
         wrench at one instant is noise, and the mean over a frame is felt. A blade that does not
@@ -270,37 +269,37 @@ class Bridge(Leading):
         """
         path = self._path
         blade, engaged = path[-1].blade, self._engaged()
-        before = self._asked_at or blade
+        before = self._queried_at or blade
         overlaps = self._broad_phase.overlaps
         if len(path) == 1:
             seconds = path[0].seconds
             touches, self._touching = overlaps(before, blade, seconds, engaged=engaged)
             sweep = BladeSweep(before.segment, blade.segment) if touches else None
-            parts = [TimedSweep(sweep, seconds, path[0].led)]
+            parts = [TimedSweep(sweep, seconds, path[0].driven)]
         else:
             seconds = sum(part.seconds for part in path)
-            if self._holds_as_much and len(path) > 2:
+            if self._is_anchored_as_before and len(path) > 2:
                 path = [path[-2]._replace(seconds=seconds - path[-1].seconds), path[-1]]
-            ways = list(pairwise([before, *(part.blade for part in path)]))
-            found = [overlaps(*way, seconds, engaged=engaged) for way in ways]
+            pairs = list(pairwise([before, *(part.blade for part in path)]))
+            found = [overlaps(*pair, seconds, engaged=engaged) for pair in pairs]
             self._touching = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
             touches = any(one.tissue for one in found)
             parts = [
-                TimedSweep(BladeSweep(t0.segment, t1.segment), part.seconds, part.led)
-                for (t0, t1), part in zip(ways, path, strict=True)
+                TimedSweep(BladeSweep(t0.segment, t1.segment), part.seconds, part.driven)
+                for (t0, t1), part in zip(pairs, path, strict=True)
             ]
             if not touches:
-                parts = [TimedSweep(None, seconds, path[-1].led)]
+                parts = [TimedSweep(None, seconds, path[-1].driven)]
         self._n_rejected += not touches
-        self._query.ask(parts, blade.segment)
+        self._query.start(parts, blade.segment)
         if not self._is_direct:
             self._impulse.end_period()
-        self._asked_at, self._path = blade, []
+        self._queried_at, self._path = blade, []
 
     def _process(self, answer: TissueAnswer) -> None:
         """Update broad phase, local model and impulse from an answer."""
         result = answer.result
-        self._led.take(answer.loads, result)
+        self._driven.take(answer.loads, result)
         self._take(result, answer.seconds)
         if not self._is_direct:
             self._model.update(result, answer.last_wrench, answer.middle_pose)
@@ -317,8 +316,8 @@ class Bridge(Leading):
         if not math.isfinite(sum(low) + sum(high)):
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
         self._broad_phase.update_bounds((low, high), seconds)
-        held = 0.0 if self._result is None else self._result.anchored_length
-        self._holds_as_much = 0.0 < result.anchored_length == held
+        before = 0.0 if self._result is None else self._result.anchored_length
+        self._is_anchored_as_before = 0.0 < result.anchored_length == before
         self._result = result
         self._n_answers += 1
 

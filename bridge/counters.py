@@ -32,7 +32,7 @@ class Counters(NamedTuple):
     """Energy that went in and out at the arm's blade, and the part that was dissipated."""
     impulse_written_off: float
     """Impulse of the tissue that the arm had not felt when contacts ended [N s]; zero where the
-    tissue is asked in each frame. See `ImpulseCompensation`."""
+    tissue is queried in each frame. See `ImpulseCompensation`."""
 
     def as_numbers(self) -> dict[str, Any]:
         """Return the counts by name, for a report."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.arithmetic import Six, Triple
 from bridge.collision.fixtures import Fixture, FixtureBox
-from bridge.input_checks import finite, rotation
+from bridge.poses import finite, rotation
 from tissue import BladeSegment, FloatArray, Wrench
 
 

@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, expect_each
-from bridge.led_geoms import NO_GEOM_LOADS, NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each
+from bridge.driven import (
+    NO_GEOM_LOADS,
+    NO_GEOMS,
+    FrameAttachment,
+    FrameLoad,
+    FramePose,
+    FrameTie,
+    GeomLoads,
+    GeomPoses,
+    expect_each,
+    expect_pose_of_each,
+)
 from tissue import (
     BladeShape,
     BladeSweep,
@@ -49,7 +59,7 @@ class SceneView(NamedTuple):
 
 
 class TissueDescription(NamedTuple):
-    """What the arm side must know of a body that it does not hold."""
+    """What the arm side must know of a body in another process."""
 
     scene: str
     """Scene that was built, as the command line names it."""
@@ -66,7 +76,7 @@ class TissueDescription(NamedTuple):
     floor: float | None = None
     """Height of the floor that pieces land on [m]; None for no floor."""
     views: tuple[SceneView, ...] = ()
-    """Where the scene is to be looked at from, the first of them at the start."""
+    """Cameras of the scene; the first of them at the start."""
 
 
 class TissueLink(Protocol):
@@ -87,16 +97,16 @@ class TissueLink(Protocol):
         Args:
             sweep: Motion of the blade.
             dt: Length of the step [s].
-            poses: Where the frames that were attached are at its end, one for each, in order.
-            geoms: Where the geoms of `collide_with` are at its end.
+            poses: Poses of the attached frames at its end, one for each, in order.
+            geoms: Poses of the geoms of `collide_with` at its end.
 
         Raises:
             ValueError: there is another number of poses, or a geom cannot move so.
             LinkError: the tissue is in another process and did not answer, or refuses the request.
         """
 
-    def attach(self, hold: FrameHold) -> int:
-        """Attach a frame to the body, which the caller leads from now on; return its number.
+    def attach(self, attachment: FrameAttachment) -> int:
+        """Attach a frame to the body, which the caller drives from now on; return its number.
 
         That is its place in `loads`, where those of the tissue's own scene come first.
 
@@ -106,7 +116,7 @@ class TissueLink(Protocol):
         """
 
     def tie(self, tie: FrameTie) -> int:
-        """Tie the body by strands to a frame, which the caller leads from now on, as `attach` does.
+        """Tie the body by strands to a frame, which the caller drives, as `attach` does.
 
         Raises:
             ValueError: see `tissue.Tissue.tie`.
@@ -114,7 +124,7 @@ class TissueLink(Protocol):
         """
 
     def release(self, number: int) -> None:
-        """Let the frame of that number go, which keeps its number; again it does nothing.
+        """Release the frame of that number, which keeps its number; again it does nothing.
 
         Raises:
             ValueError: there is no such frame; `LinkError`, where the tissue is elsewhere.
@@ -128,11 +138,11 @@ class TissueLink(Protocol):
         """
 
     def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
-        """Let the body touch rigid geoms from now on, which the caller leads, and no others.
+        """Replace the rigid geoms that the body touches; the caller drives them from now on.
 
         Args:
             geoms: The geoms.
-            poses: Where they are now; each step takes where they are at its end.
+            poses: Poses of the geoms now; each step takes those at its end.
 
         Raises:
             ValueError: see `tissue.Tissue.collide_with`.
@@ -170,7 +180,7 @@ class InProcessLink:
     Args:
         tissue: The tissue.
         scene: Its name, as the command line gives it; for reports only.
-        views: Where its scene is to be looked at from.
+        views: Cameras of its scene.
     """
 
     def __init__(self, tissue: Tissue, scene: str = "", views: Sequence[SceneView] = ()) -> None:
@@ -208,25 +218,25 @@ class InProcessLink:
         geoms: GeomPoses = NO_GEOMS,
     ) -> StepResult:
         """Advance the tissue by `dt` [s]; see `TissueLink.step`."""
-        led = self._frames[self._n_own :]
-        expect_each(poses, len(led))
+        driven = self._frames[self._n_own :]
+        expect_each(poses, len(driven))
         expect_pose_of_each(geoms, self._n_geoms)
         if self._geoms is not None:
             self._geoms.move(geoms)
-        for frame, pose in zip(led, poses, strict=True):
+        for frame, pose in zip(driven, poses, strict=True):
             frame.move(pose.origin, pose.rotation)
         return self._tissue.step(sweep, dt)
 
-    def attach(self, hold: FrameHold) -> int:
+    def attach(self, attachment: FrameAttachment) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
-        attachment = self._tissue.attach(
-            _places(hold.where),
-            stiffness=hold.stiffness,
-            damping=hold.damping,
-            breaks_at=hold.breaks_at,
-            origin=hold.origin,
+        frame = self._tissue.attach(
+            _places(attachment.where),
+            stiffness=attachment.stiffness,
+            damping=attachment.damping,
+            breaks_at=attachment.breaks_at,
+            origin=attachment.origin,
         )
-        return self._added(attachment)
+        return self._added(frame)
 
     def tie(self, tie: FrameTie) -> int:
         """Tie the body by strands to a frame; see `TissueLink.tie`."""
@@ -248,7 +258,7 @@ class InProcessLink:
         return len(self._frames) - 1
 
     def release(self, number: int) -> None:
-        """Let the frame of that number go."""
+        """Release the frame of that number."""
         if not 0 <= number < len(self._frames):
             raise ValueError(f"there is no frame {number}; there are {len(self._frames)}")
         frame = self._frames[number]
@@ -260,12 +270,12 @@ class InProcessLink:
         return [FrameLoad(frame.wrench, frame.n_points) for frame in self._frames]
 
     @property
-    def n_led(self) -> int:
+    def n_driven(self) -> int:
         """Number of frames that were attached over this link, whose poses each step takes."""
         return len(self._frames) - self._n_own
 
     def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
-        """Let the body touch rigid geoms; see `TissueLink.collide_with`."""
+        """Replace the geoms that the body touches; see `TissueLink.collide_with`."""
         from bridge.collision.touched_geoms import TouchedGeoms  # few need its collision library
 
         expect_pose_of_each(poses, len(geoms))

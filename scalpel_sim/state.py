@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import mujoco
 import numpy as np
 
-from bridge import InProcessLink, LedGrip, Proxy, TissueFrame, TissueLink
+from bridge import DrivenFrame, InProcessLink, Proxy, TissueFrame, TissueLink
 from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.instruments.grip import Grip
@@ -40,7 +40,7 @@ _RULES = StateRules(
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the
     # stroke that was recorded.
     unwritten=frozenset({"Simulation.controller", "DrivenGrasper.controller"}),
-    made={kind.__name__: kind for kind in (Grip, LedGrip, Proxy)},
+    made={kind.__name__: kind for kind in (Grip, DrivenFrame, Proxy)},
 )
 """Rules of the state of arm and bridge; the tissue has its own."""
 

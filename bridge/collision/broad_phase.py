@@ -11,17 +11,16 @@ chunks, which leave the hollows of a body free.
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
+import fcl
 import numpy as np
 
 from bridge.arithmetic import Triple
-from bridge.collision.chunk_boxes import ChunkBoxes
+from bridge.collision.coherence import SeparatingAxis, WitnessPoint
 from bridge.collision.collision_objects import MovableBox, Obstacles, are_colliding, fixture_objects
 from bridge.collision.fixtures import Fixture
-from bridge.collision.separating_axis import SeparatingAxis
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, swept_blade
-from bridge.collision.witness_point import WitnessPoint
 from bridge.poses import Pose
-from tissue import BladeShape, BladeSweep, Chunks, FloatArray
+from tissue import BladeShape, BladeSweep, Chunks, FloatArray, IntArray
 
 
 class _Overlaps(NamedTuple):
@@ -46,17 +45,17 @@ class BroadPhase:
       around the body, that of its fastest side in the last step; for the chunks, that of the
       fastest node.
 
-    The collision library is asked only where the last answer may have changed: not where they were
-    apart and an axis still separates them (`SeparatingAxis`), nor where they overlapped and a point
-    of the blade is still near the tissue (`WitnessPoint`).
+    The collision library is queried only where the last answer may have changed: not where blade
+    and tissue were apart and an axis still separates them (`SeparatingAxis`), nor where they
+    overlapped and a point of the blade is still near the tissue (`WitnessPoint`).
 
     Args:
         bounds: Lowest and highest corner of the tissue now [m], shape (2, 3).
         sound_speed: Speed of compression waves in the tissue [m/s].
         fixtures: Obstacles, in the tissue frame.
         blade: Shape of the blade behind the edge; None for the edge alone.
-        chunks: Function that asks the tissue for its chunks; None where that takes longer than it
-            saves.
+        chunks: Function that queries the tissue for its chunks; None where that takes longer than
+            it saves.
 
     Raises:
         ValueError: two fixtures have one name.
@@ -75,7 +74,7 @@ class BroadPhase:
         self._bounds: tuple[Triple, Triple] = low, high
         self._sound_speed = sound_speed
         self._bounds_before, self._seconds = self._bounds, 1.0
-        self._way: float | None = None
+        self._shift: float | None = None
         self._blade_shape = blade
         self._chunks = chunks
         self._blade = MovableBox()
@@ -106,22 +105,22 @@ class BroadPhase:
     def update_bounds(self, bounds: tuple[Triple, Triple], dt: float) -> None:
         """Set lowest and highest corner of the tissue [m] after a step of `dt` [s]."""
         self._bounds_before, self._bounds, self._seconds = self._bounds, bounds, dt
-        self._way = None
+        self._shift = None
         if self._separating.is_found:
-            self._separating.tissue_moved(self._way_of_bounds())
+            self._separating.tissue_moved(self._shift_of_bounds())
 
-    def _way_of_bounds(self) -> float:
+    def _shift_of_bounds(self) -> float:
         """Return how far the fastest side of the box around the tissue moved in a step [m]."""
-        if self._way is None:  # a blade that holds tissue does not ask
+        if self._shift is None:  # a blade that holds tissue does not query it
             (ax, ay, az), (bx, by, bz) = self._bounds_before
             (ux, uy, uz), (vx, vy, vz) = self._bounds
             moved = max(abs(ux - ax), abs(uy - ay), abs(uz - az))
-            self._way = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz))
-        return self._way
+            self._shift = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz))
+        return self._shift
 
     def _reaches_tissue(self, before: Pose, after: Pose, dt: float) -> bool:
         """Return whether the blade can touch the tissue: its box, and then one of its chunks."""
-        travel = (self._sound_speed + self._way_of_bounds() / self._seconds) * dt
+        travel = (self._sound_speed + self._shift_of_bounds() / self._seconds) * dt
         if self._separating.separates(before, after, self._bounds, travel):
             return False
         witness = self._witness
@@ -173,3 +172,63 @@ _ONLY_TISSUE, _NOTHING = _Overlaps(True, ()), _Overlaps(False, ())
 def _inflated(box: SweptBox, distance: float) -> SweptBox:
     """Return a box that is larger by a distance [m] on every side."""
     return box._replace(size=box.size + 2.0 * distance)
+
+
+def not_separated(box: SweptBox, chunks: FloatArray) -> IntArray:
+    """Return the numbers of the chunks that no face of the box, or of their own, separates from it.
+
+    Six of the fifteen axes of the separating axis theorem (Gottschalk et al. 1996), for all chunks
+    at once; chunks that only a pair of edges separates remain. The trees of the collision library
+    are of no use here: they bound a rotated box by a sphere, and a blade is long.
+
+    Args:
+        box: Swept box of the blade.
+        chunks: Lowest and highest corners of the chunks [m], shape (n, 2, 3).
+    """
+    half = 0.5 * (chunks[:, 1] - chunks[:, 0]) + TOUCHING_MARGIN
+    offset = 0.5 * (chunks[:, 0] + chunks[:, 1]) - box.centre
+    cosines = np.abs(box.axes)
+    apart = np.abs(offset) > half + cosines @ (0.5 * box.size)
+    apart |= np.abs(offset @ box.axes) > 0.5 * box.size + half @ cosines
+    return np.flatnonzero(~apart.any(axis=1))
+
+
+class ChunkBoxes:
+    """Tests a box against chunks: all at once, then those that remain by the collision library.
+
+    The chunk that it overlapped last is tested first, because mostly it still does.
+    """
+
+    def __init__(self) -> None:
+        self._chunk = MovableBox()
+        self._last = -1
+
+    def collide_with(self, box: SweptBox, fcl_box: fcl.CollisionObject, chunks: FloatArray) -> bool:
+        """Return whether a box overlaps a chunk.
+
+        Args:
+            box: Swept box of the blade.
+            fcl_box: The box as an object of the collision library.
+            chunks: Lowest and highest corners of the chunks [m], shape (n, 2, 3).
+        """
+        if 0 <= self._last < len(chunks) and self._collides(fcl_box, chunks[self._last]):
+            return True
+        for i in not_separated(box, chunks).tolist():
+            if self._collides(fcl_box, chunks[i]):
+                self._last = i
+                return True
+        return False
+
+    def last_of(self, chunks: FloatArray) -> tuple[Triple, Triple] | None:
+        """Return the corners [m] of the chunk that overlapped last; None if it is not known."""
+        if not 0 <= self._last < len(chunks):
+            return None
+        low, high = chunks[self._last].tolist()
+        return low, high
+
+    def _collides(self, fcl_box: fcl.CollisionObject, chunk: FloatArray) -> bool:
+        """Return whether a box overlaps a chunk, of which the corners are given."""
+        low, high = chunk
+        size = high - low + 2.0 * TOUCHING_MARGIN
+        self._chunk.place(SweptBox(0.5 * (low + high), size, _WORLD_AXES))
+        return are_colliding(self._chunk.object, fcl_box)

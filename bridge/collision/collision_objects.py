@@ -1,4 +1,4 @@
-"""Objects of the collision library (python-fcl), used only in ways that are safe.
+"""Objects of the collision library (python-fcl), used only where it is safe.
 
 The package avoids each of these, because it was seen to end the process or to answer wrongly:
 
@@ -52,7 +52,7 @@ class Obstacles:
         self._manager.setup()
 
     def update(self) -> None:
-        """Take where the objects are now; whoever moves them calls this."""
+        """Read the poses of the objects; whoever moves them calls this."""
         if self._objects:
             self._manager.update()
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bridge.input_checks import finite, rotation
+from bridge.poses import finite, rotation
 from tissue import FloatArray, IntArray
 
 

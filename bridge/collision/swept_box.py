@@ -1,4 +1,8 @@
-"""Boxes around the whole motion of a body in a step, so that a fast one cannot tunnel through."""
+"""Boxes around the whole motion of a body in a step, so that a fast one cannot tunnel through.
+
+The gap between two boxes is a lower bound on their distance, by their separating axes (Gottschalk
+et al. 1996).
+"""
 
 import math
 from typing import NamedTuple
@@ -11,6 +15,10 @@ TOUCHING_MARGIN = 1e-6
 """Length added to every side of a box [m]. Two boxes that only touch are apart for the collision
 library, and a box without thickness has no inside. A micrometre is far above the rounding of
 coordinates of a metre, and far below the size of a tetrahedron that is cut."""
+
+_NOT_PARALLEL = 1e-6
+"""Least sine of the angle of two edges whose common normal is an axis. Edges that are more nearly
+parallel have no such axis beyond rounding, and the axes of the faces separate their boxes."""
 
 
 class SweptBox(NamedTuple):
@@ -79,3 +87,27 @@ def axes_across(segment: BladeSegment) -> tuple[float, ...]:
     nx, ny, nz = nx / length, ny / length, nz / length
     fx, fy, fz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
     return (fx, ex, nx, fy, ey, ny, fz, ez, nz)
+
+
+def gap_between(one: SweptBox, other: SweptBox) -> float:
+    """Return the largest gap between two boxes along one of fifteen axes [m]; 0 without any.
+
+    Boxes are at least as far apart as their projections onto a line. Zero means that they overlap.
+    """
+    return max(largest_gap(one, other)[0], 0.0)
+
+
+def largest_gap(one: SweptBox, other: SweptBox) -> tuple[float, FloatArray]:
+    """Return the largest gap, negative where two boxes overlap, and its axis from `one` to `other`.
+
+    The axis is a unit vector, shape (3,).
+    """
+    edges = np.cross(one.axes.T[:, None], other.axes.T[None, :]).reshape(9, 3)
+    lengths = np.sqrt(np.square(edges).sum(axis=1))
+    has_axis = lengths > _NOT_PARALLEL
+    axes = np.concatenate((one.axes.T, other.axes.T, edges[has_axis] / lengths[has_axis, None]))
+    extents = np.abs(axes @ one.axes) @ one.size + np.abs(axes @ other.axes) @ other.size
+    offsets = axes @ (other.centre - one.centre)
+    gaps = np.abs(offsets) - 0.5 * extents
+    i = int(np.argmax(gaps))
+    return float(gaps[i]), axes[i] if offsets[i] >= 0.0 else -axes[i]

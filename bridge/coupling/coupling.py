@@ -1,5 +1,6 @@
 """From the tissue's wrench to the one that the arm feels: finite, within limits, passive."""
 
+import logging
 import math
 from typing import NoReturn
 
@@ -8,9 +9,10 @@ import numpy as np
 from bridge.arithmetic import PLAIN, Arithmetic, Six, Triple
 from bridge.coupling.limits import DeviceLimits, factor_to_limit
 from bridge.coupling.passivity import Passivity, PassivityCounters, Travel
-from bridge.coupling.watchdog import Watchdog
 from bridge.poses import six
 from tissue import Wrench
+
+_log = logging.getLogger(__name__)
 
 MAX_PLAUSIBLE_FORCE = 1e3
 """Largest plausible force [N]. Soft tissue under a scalpel exerts newtons; a kilonewton means that
@@ -25,13 +27,30 @@ MAX_PLAUSIBLE_SPEED = 100.0
 was put elsewhere or diverges, and the blade would pass through the tissue in a frame."""
 
 MAX_PLAUSIBLE_TURN = 0.5 * math.pi
-"""Largest plausible turn of a blade in a frame [rad]: beyond, the way it took is a guess."""
+"""Largest plausible turn of a blade in a frame [rad]: beyond, its path is a guess."""
 
 MAX_IMPLAUSIBLE_FRAMES = 10
 """Frames in a row with an implausible wrench after which the run stops: 10 ms at 1 kHz. A single
 one may be a node that the blade has flicked and that comes to rest."""
 
+WARN_AFTER = 0.010
+"""Silence [s] after which a warning is logged: ten periods of a haptic device, and longer than the
+usual delays of a busy machine."""
+
+DECAY_AFTER = 0.050
+"""Silence [s] after which the wrench fades. Until then the tissue's last answer and its stiffness
+are a fair estimate: a hand moves by a few millimetres in that time."""
+
+ZERO_AFTER = 0.500
+"""Silence [s] after which nothing is felt, because the state at the blade is unknown. AMBF, a
+driver for surgical robots, waits as long before it considers its commander lost."""
+
+RAMP = 0.1
+"""Time [s] in which a wrench returns from zero to its full value. A hand that is pushed by surprise
+takes about as long to react; a wrench that returned at once would throw it."""
+
 _NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 _AT_REST = Travel((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
 
 
@@ -200,10 +219,57 @@ def expect_plausible_motion(motion: Six, dt: float) -> None:
             `MAX_PLAUSIBLE_TURN`.
     """
     x, y, z, u, v, w = motion
-    way, turn = math.hypot(x, y, z), math.hypot(u, v, w)
-    if way > MAX_PLAUSIBLE_SPEED * dt or turn > MAX_PLAUSIBLE_TURN:
+    distance, turn = math.hypot(x, y, z), math.hypot(u, v, w)
+    if distance > MAX_PLAUSIBLE_SPEED * dt or turn > MAX_PLAUSIBLE_TURN:
         raise CouplingError(
-            f"the tip of the blade moved by {way:.3g} m, and the blade turned by {turn:.3g} rad, "
-            f"in {dt:g} s; up to {MAX_PLAUSIBLE_SPEED:g} m/s and {MAX_PLAUSIBLE_TURN:.3g} rad are "
-            "taken. Lead the arm there, or make another Bridge where it is put elsewhere"
+            f"the tip of the blade moved by {distance:.3g} m, and the blade turned by {turn:.3g} "
+            f"rad, in {dt:g} s; up to {MAX_PLAUSIBLE_SPEED:g} m/s and {MAX_PLAUSIBLE_TURN:.3g} rad "
+            "are taken. Move the arm there by a path, or make another Bridge where it is put "
+            "elsewhere"
         )
+
+
+class Watchdog:
+    """A factor between 0 and 1 for the wrench that the arm feels.
+
+    A device that holds the last force of a tissue that has stopped would push for ever. So the
+    factor falls linearly between `DECAY_AFTER` and `ZERO_AFTER` of silence, and rises over `RAMP`
+    when answers come again.
+    """
+
+    def __init__(self) -> None:
+        self._gain = 1.0
+        self._is_silent = False
+        self.n_silent = 0
+        """Frames in which the tissue had been silent for `WARN_AFTER` or more."""
+        self.n_faded = 0
+        """Frames in which less than the full wrench was felt, by fading or by the ramp."""
+
+    def gain(self, silence: float, dt: float) -> float:
+        """Return the factor for the next `dt` [s].
+
+        Args:
+            silence: How long the arm has waited for the tissue by now [s].
+            dt: Length of the frame [s].
+        """
+        if silence == 0.0 and self._gain == 1.0:
+            self._is_silent = False
+            return 1.0
+        if silence >= WARN_AFTER:
+            self.n_silent += 1
+            if not self._is_silent:
+                _log.warning(
+                    "the tissue has not answered for %.0f ms: the arm feels its last answer, which "
+                    "fades after %.0f ms",
+                    1e3 * silence,
+                    1e3 * DECAY_AFTER,
+                )
+        self._is_silent = silence >= WARN_AFTER
+        allowed = min(1.0, max(0.0, (ZERO_AFTER - silence) / (ZERO_AFTER - DECAY_AFTER)))
+        self._gain = min(allowed, self._gain + dt / RAMP)
+        self.n_faded += self._gain < 1.0
+        return self._gain
+
+    def reset(self) -> None:
+        """Set the factor to zero; it rises again over `RAMP`."""
+        self._gain = 0.0

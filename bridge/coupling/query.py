@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridge.coupling.led_bodies import LedLoads, LedPoses, loads_over, mean_loads
-from bridge.led_frames import mean_wrench
+from bridge.coupling.driven_bodies import DrivenLoads, DrivenPoses, loads_over, mean_loads
+from bridge.driven import mean_wrench
 from bridge.link import TissueLink
 from bridge.poses import motion, moved
 from tissue import BladeSegment, BladeSweep, StageTimes, StepResult, Wrench
 
 _LONGEST_STEP = 0.5
-"""Longest step that a tissue is asked for [s]. The rest of a longer silence is lost: to make up for
+"""Longest step of a query [s]. The rest of a longer silence is lost: to make up for
 it would take ever longer."""
 
 
@@ -24,8 +24,8 @@ class TimedSweep(NamedTuple):
     """Motion of the blade; None if it is nowhere near the tissue."""
     seconds: float
     """Duration [s]."""
-    led: LedPoses = LedPoses()
-    """Where the frames and geoms are at its end that the arm's side leads."""
+    driven: DrivenPoses = DrivenPoses()
+    """Poses of the driven frames and geoms at its end."""
 
 
 class TissueAnswer(NamedTuple):
@@ -41,7 +41,7 @@ class TissueAnswer(NamedTuple):
     """Mean wrench over the last part of the path; its point is the tip at the end."""
     last_sweep: BladeSweep | None
     """Last part of the path; None if the blade was nowhere near."""
-    loads: LedLoads
+    loads: DrivenLoads
     """Mean loads on frames and geoms over the query."""
 
     @property
@@ -53,13 +53,13 @@ class TissueAnswer(NamedTuple):
 
 
 class Query:
-    """Asks the tissue to advance to the present, one request at a time.
+    """Advances the tissue to the present, one query at a time.
 
     Args:
         link: The tissue.
-        waits: Whether `ask` returns only when the answer is there, so that a run does not depend on
-            how long it takes. Otherwise the tissue is asked in a thread, for an arm that cannot
-            wait.
+        waits: Whether `start` returns only when the answer is there, so that a run does not depend
+            on how long it takes. Otherwise the tissue is queried in a thread, for an arm that
+            cannot wait.
     """
 
     def __init__(self, link: TissueLink, waits: bool) -> None:
@@ -73,8 +73,8 @@ class Query:
         """Whether an answer has not been taken yet."""
         return self._future is not None or self._answer is not None
 
-    def ask(self, path: Sequence[TimedSweep], pose: BladeSegment) -> None:
-        """Ask for the steps along a path.
+    def start(self, path: Sequence[TimedSweep], pose: BladeSegment) -> None:
+        """Start a query for the steps along a path.
 
         Args:
             path: Parts of the blade's path since the last query, in order.
@@ -89,14 +89,14 @@ class Query:
             self._future = self._thread.submit(self._step, path, pose)
 
     def step(
-        self, sweep: BladeSweep | None, seconds: float, led: LedPoses = LedPoses()
+        self, sweep: BladeSweep | None, seconds: float, driven: DrivenPoses = DrivenPoses()
     ) -> StepResult:
         """Advance the tissue along one part of a path, and wait for it; see `TimedSweep`.
 
         Raises:
             LinkError: the tissue is in another process, and did not answer.
         """
-        return self._link.step(sweep, min(seconds, _LONGEST_STEP), *led)
+        return self._link.step(sweep, min(seconds, _LONGEST_STEP), *driven)
 
     def wait(self) -> None:
         """Wait for the answer, if there is a request: then the link is free for another one."""
@@ -132,7 +132,7 @@ class Query:
             sum(seconds),
             last_wrench,
             last_sweep,
-            mean_loads(parts, [part.led for part in path], seconds),
+            mean_loads(parts, [part.driven for part in path], seconds),
         )
 
 

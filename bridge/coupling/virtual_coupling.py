@@ -79,7 +79,7 @@ class VirtualCoupling:
 
 
 class Proxy:
-    """The blade that touches the tissue, led by the arm's blade through a virtual coupling.
+    """The blade that touches the tissue, driven by the arm's blade through a virtual coupling.
 
     In each frame it moves to where the wrenches of the coupling and of the tissue, by its local
     model, are in balance. So it stays where the tissue holds it, and the arm feels the balance.

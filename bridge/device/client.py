@@ -1,4 +1,4 @@
-"""A device's end of the link to a run whose blade it leads."""
+"""A device's end of the link to a run whose blade it drives."""
 
 import time
 from types import TracebackType
@@ -9,12 +9,13 @@ import numpy as np
 from bridge.device.messages import (
     LARGEST_DEVICE_DESCRIPTION,
     STATE_BYTES,
+    CartesianPose,
+    DeviceState,
     ServoRequest,
     pack_servo,
     unpack_device_description,
     unpack_state,
 )
-from bridge.device.values import CartesianPose, DeviceState
 from bridge.link import LinkError
 from bridge.tcp.connection import Connection, Served
 from bridge.tcp.wire import MessageKind
@@ -31,7 +32,7 @@ _BLADE = Served(
 
 
 class DeviceClient:
-    """Leads the blade of a run, as a haptic device or a SpaceMouse does.
+    """Drives the blade of a run, as a haptic device or a SpaceMouse does.
 
     Not to be shared between threads. Where a pose is refused, the link stays open, and the blade
     rests until the next good one; when the connection fails, the link is closed.
@@ -44,7 +45,7 @@ class DeviceClient:
 
     Raises:
         ValueError: the address is malformed, or of another machine and there is no key.
-        LinkError: no run waits there, another device leads it, or it has another key.
+        LinkError: no run waits there, another device drives it, or it has another key.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class DeviceClient:
         self._period = period
         self._connection = Connection(address, _BLADE, DEVICE_ANSWER_SECONDS, key, patience)
         try:
-            self.description = self._connection.ask(
+            self.description = self._connection.request(
                 MessageKind.HELLO, b"", LARGEST_DEVICE_DESCRIPTION, unpack_device_description
             )
             """What there is to know of the run."""
@@ -87,7 +88,7 @@ class DeviceClient:
         Args:
             position: [m], world frame, shape (3,).
             orientation: Unit quaternion (w, x, y, z), shape (4,).
-            holds: Whether it leads the blade, which rests otherwise.
+            holds: Whether the device drives the blade, which rests otherwise.
 
         Raises:
             LinkError: the pose was refused, or the run did not answer.
@@ -117,4 +118,4 @@ class DeviceClient:
         self._connection.close()
 
     def _state(self, kind: MessageKind, payload: bytes = b"") -> DeviceState:
-        return self._connection.ask(kind, payload, STATE_BYTES, unpack_state)
+        return self._connection.request(kind, payload, STATE_BYTES, unpack_state)

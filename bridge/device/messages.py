@@ -7,10 +7,56 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
-from bridge.scene_names import WANTED_NAME, is_scene_name
+from bridge.tcp.messages.text import WANTED_NAME, is_scene_name
 from bridge.tcp.wire import MessageError
-from tissue import LARGEST_COORDINATE, Wrench
+from tissue import LARGEST_COORDINATE, FloatArray, Wrench
+
+
+class CartesianPose(NamedTuple):
+    """A pose in the world."""
+
+    position: FloatArray
+    """[m], shape (3,)."""
+    orientation: FloatArray
+    """Unit quaternion (w, x, y, z), shape (4,)."""
+
+
+class DeviceState(NamedTuple):
+    """State of the blade that a device drives, after the last frame."""
+
+    time: float
+    """Simulated time [s]."""
+    real_time_factor: float
+    """Simulated time over wall time, over the last half second."""
+    measured_cp: CartesianPose
+    """Where the blade is: the origin is its tip, +y points from heel to tip, -z cuts."""
+    measured_cf: Wrench
+    """What the tissue does to the blade, as the simulated arm feels it within its limits: force and
+    torque about the tip, world frame."""
+    is_engaged: bool
+    """Whether the device drives the blade now."""
+    has_ended: bool
+    """Whether the stroke has ended; the blade rests from then on."""
+    n_limited: int
+    """Frames in which a limit of speed, turn rate or room held the blade back."""
+    n_missed: int = 0
+    """Periods in which a device was to send a pose, and sent none."""
+    n_dropped: int = 0
+    """Messages that were refused, such as a pose that is not finite."""
+
+
+class DeviceDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Description of the run whose blade it drives."""
+
+    scene: str
+    """Name of the scene."""
+    watchdog: float
+    """Wall time without a pose after which the blade rests [s]."""
+    most_speed: float
+    """Highest speed of the middle of the edge [m/s]."""
+    most_turn_rate: float
+    """Highest rate at which the blade turns [rad/s]."""
+
 
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-5, 1.0
 """Shortest and longest period [s]. A device sends up to a thousand poses a second."""
@@ -22,6 +68,7 @@ _UNIT_TOLERANCE = 1e-3
 """Largest difference of the length of a quaternion from 1: some devices send three decimals."""
 
 _SERVO = struct.Struct("<9dI")
+
 _STATE = struct.Struct("<15d3q2I")
 
 STATE_BYTES = _STATE.size
@@ -40,7 +87,7 @@ class ServoRequest(NamedTuple):
     servo_cp: CartesianPose
     """The pose."""
     holds: bool
-    """Whether the device leads the blade."""
+    """Whether the device drives the blade."""
 
 
 def pack_servo(request: ServoRequest) -> bytes:
@@ -128,14 +175,14 @@ def unpack_device_description(payload: bytes) -> DeviceDescription:
     """Return the description in the reply to a HELLO.
 
     Raises:
-        MessageError: the other side is no run that a device leads, or its scene has no valid name.
+        MessageError: the other side is no run that a device drives, or its scene has no valid name.
     """
     try:
         found = _description_decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(
-            "it is no run that a device leads; start one there with: scalpel-sim run --hand device "
-            f"({error})"
+            "it is no run that a device drives; start one there with: scalpel-sim run --hand "
+            f"device ({error})"
         ) from error
     if not is_scene_name(found.scene):
         raise MessageError(f"the run's scene is {found.scene[:80]!r}; wanted {WANTED_NAME}")

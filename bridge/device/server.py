@@ -1,4 +1,4 @@
-"""The run's end of the link to a device that leads its blade."""
+"""The run's end of the link to a device that drives its blade."""
 
 import logging
 import time
@@ -7,14 +7,16 @@ from typing import Protocol
 from msgspec import structs
 
 from bridge.device.messages import (
+    CartesianPose,
+    DeviceDescription,
+    DeviceState,
     ServoRequest,
     pack_device_description,
     pack_state,
     unpack_servo,
 )
-from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
-from bridge.scene_names import sent_scene_name
 from bridge.tcp.address import DEFAULT_HOST
+from bridge.tcp.messages.text import sent_scene_name
 from bridge.tcp.peer import Peer
 from bridge.tcp.single_client import SingleClientServer
 from bridge.tcp.wire import Frame, MessageError, MessageKind
@@ -30,21 +32,21 @@ LONGEST_PAUSE = 3600.0
 stays a number that a reply has room for."""
 
 
-class LedByDevice(Protocol):
-    """What a device leads."""
+class DrivenBlade(Protocol):
+    """The blade that a device drives."""
 
     def servo_cp(self, pose: CartesianPose, *, holds: bool) -> None:
-        """Lead the blade as the device has moved to a pose; without `holds` it rests.
+        """Drive the blade as the device has moved to a pose; without `holds` it rests.
 
         Raises:
             ValueError: the device cannot have moved so.
         """
 
     def let_go(self) -> None:
-        """Let the blade rest where it is."""
+        """Release the blade, which rests where it is."""
 
     def lose_client(self) -> None:
-        """Do what is due when the device has gone: the blade rests where it is, at least."""
+        """Release the blade at least: the device has gone."""
 
     def end(self) -> None:
         """End the stroke."""
@@ -54,12 +56,12 @@ class LedByDevice(Protocol):
 
 
 class DeviceServer(SingleClientServer):
-    """Lets one device at a time lead a blade; it is served between two frames.
+    """Serves one device at a time, which drives a blade; it is served between two frames.
 
-    What is refused, a device that leaves, and a stream that cannot be read let go of the blade.
+    What is refused, a device that leaves, and a stream that cannot be read release the blade.
 
     Args:
-        led: What the device leads.
+        driven: What the device leads.
         description: What a device should know of it.
         host: Host to listen on; without a key only loopback.
         port: Port to listen on; 0 for a free one.
@@ -77,7 +79,7 @@ class DeviceServer(SingleClientServer):
 
     def __init__(
         self,
-        led: LedByDevice,
+        driven: DrivenBlade,
         description: DeviceDescription,
         *,
         host: str = DEFAULT_HOST,
@@ -85,7 +87,7 @@ class DeviceServer(SingleClientServer):
         key: bytes | None = None,
     ) -> None:
         super().__init__("the blade", host, port, key)
-        self._led = led
+        self._driven = driven
         self._description = structs.replace(description, scene=sent_scene_name(description.scene))
         self._stamp: float | None = None
         self._is_refusing = False
@@ -100,16 +102,16 @@ class DeviceServer(SingleClientServer):
 
     def state(self) -> DeviceState:
         """Return how the blade is, with what was counted of the devices so far."""
-        return self._led.state()._replace(n_missed=self._n_missed, n_dropped=self._n_dropped)
+        return self._driven.state()._replace(n_missed=self._n_missed, n_dropped=self._n_dropped)
 
     def _forget_client(self) -> None:
         self._stamp, self._is_refusing = None, False
-        self._led.lose_client()
+        self._driven.lose_client()
 
     def _note_refusal(self, peer: Peer, error: MessageError) -> None:
-        """Let go of the blade; log the first of refusals in a row, of which there may be many."""
+        """Release the blade; log the first of refusals in a row, of which there may be many."""
         self._n_dropped += 1
-        self._led.let_go()
+        self._driven.let_go()
         if not self._is_refusing:
             super()._note_refusal(peer, error)
         self._is_refusing = True
@@ -122,13 +124,13 @@ class DeviceServer(SingleClientServer):
         elif frame.kind == MessageKind.HELLO:
             return pack_device_description(self._description)
         elif frame.kind == MessageKind.END:
-            self._led.end()
+            self._driven.end()
         elif frame.kind != MessageKind.MEASURED:
-            raise MessageError(f"there is no request of kind {frame.kind} where a device leads")
+            raise MessageError(f"there is no request of kind {frame.kind} where a device drives")
         return pack_state(self.state())
 
     def _servo(self, request: ServoRequest) -> None:
-        """Lead the blade, and count the periods since the last pose in which none was sent.
+        """Drive the blade, and count the periods since the last pose in which none was sent.
 
         Raises:
             MessageError: the device cannot have moved so.
@@ -138,7 +140,7 @@ class DeviceServer(SingleClientServer):
             self._n_missed += max(round(pause / request.period) - 1, 0)
         self._stamp = request.stamp
         try:
-            self._led.servo_cp(request.servo_cp, holds=request.holds)
+            self._driven.servo_cp(request.servo_cp, holds=request.holds)
         except ValueError as error:
             raise MessageError(str(error)) from error
         self._is_refusing = False

@@ -1,11 +1,24 @@
-"""Addresses "HOST:PORT" at which a tissue is served, and which of them other machines can reach."""
+"""Addresses "HOST:PORT" at which a tissue is served, and the sockets there."""
 
 import ipaddress
 import socket
 from typing import Any
 
 DEFAULT_HOST = "127.0.0.1"
+
 DEFAULT_PORT = 8766
+
+IDLE_SECONDS = 10
+"""Silence after which the system probes the other one [s]."""
+
+PROBE_SECONDS = 5
+"""Time between two such questions [s]."""
+
+N_PROBES = 3
+"""Questions without an answer after which the connection is broken. So it takes 25 s, in which a
+network may be out of order for a moment."""
+
+_GONE_MILLISECONDS = 1000 * (IDLE_SECONDS + N_PROBES * PROBE_SECONDS)
 
 
 def parse_address(address: str) -> tuple[str, int]:
@@ -61,3 +74,22 @@ def bound_socket(host: str, port: int, *, has_key: bool) -> socket.socket:
         listener.close()
         raise
     return listener
+
+
+def keep_alive(connection: socket.socket) -> None:
+    """Enable probes that break a connection whose other end no longer answers.
+
+    A process that is killed closes its connections. A machine that loses its power or its network
+    does not, and without this its place would be taken for ever.
+    """
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in (
+        ("TCP_KEEPIDLE", IDLE_SECONDS),
+        ("TCP_KEEPALIVE", IDLE_SECONDS),  # its name on macOS
+        ("TCP_KEEPINTVL", PROBE_SECONDS),
+        ("TCP_KEEPCNT", N_PROBES),
+        ("TCP_USER_TIMEOUT", _GONE_MILLISECONDS),  # for what was sent and is not acknowledged
+    ):
+        option = getattr(socket, name, None)
+        if option is not None:
+            connection.setsockopt(socket.IPPROTO_TCP, option, value)

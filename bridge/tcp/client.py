@@ -3,8 +3,18 @@
 import functools
 from collections.abc import Callable, Sequence
 
-from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, expect_each
-from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
+from bridge.driven import (
+    NO_GEOMS,
+    FrameAttachment,
+    FrameLoad,
+    FramePose,
+    FrameTie,
+    GeomLoads,
+    GeomPoses,
+    expect_each,
+    expect_pose_of_each,
+    no_geom_loads,
+)
 from bridge.link import TissueDescription
 from bridge.tcp.connection import ANSWER_SECONDS, Connection, Served
 from bridge.tcp.messages.body import (
@@ -21,7 +31,7 @@ from bridge.tcp.messages.geoms import pack_geoms
 from bridge.tcp.messages.led_frames import (
     LOAD_BYTES,
     MAX_FRAMES,
-    pack_hold,
+    pack_attachment,
     pack_number,
     pack_tie,
     unpack_all_loads,
@@ -94,7 +104,7 @@ class TcpLink:
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
-        description = self._connection.ask(
+        description = self._connection.request(
             MessageKind.HELLO, b"", LARGEST_DESCRIPTION, unpack_description
         )
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
@@ -119,14 +129,14 @@ class TcpLink:
         expect_pose_of_each(geoms, n_geoms)
         request = pack_step(sweep, dt, poses, geoms)
         unpack = functools.partial(_checked_result, self._loads, n_geoms)
-        answer = self._connection.ask(MessageKind.STEP, request, LARGEST_RESULT, unpack)
+        answer = self._connection.request(MessageKind.STEP, request, LARGEST_RESULT, unpack)
         result, self._loads, self._geom_loads = answer
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
 
-    def attach(self, hold: FrameHold) -> int:
+    def attach(self, attachment: FrameAttachment) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
-        return self._added(MessageKind.ATTACH, pack_hold(hold))
+        return self._added(MessageKind.ATTACH, pack_attachment(attachment))
 
     def tie(self, tie: FrameTie) -> int:
         """Tie the body by strands to a frame; see `TissueLink.tie`."""
@@ -135,15 +145,15 @@ class TcpLink:
     def _added(self, kind: MessageKind, request: bytes) -> int:
         """Ask for a frame, and return its number."""
         before = self.loads()
-        reply = self._connection.ask(kind, request, LOAD_BYTES, _one_load)
+        reply = self._connection.request(kind, request, LOAD_BYTES, _one_load)
         self._loads = [*before, reply]
         self._n_led += 1
         return len(before)
 
     def release(self, number: int) -> None:
-        """Let the frame of that number go."""
+        """Release the frame of that number."""
         loads = [*self.loads()]
-        loads[number] = self._connection.ask(
+        loads[number] = self._connection.request(
             MessageKind.RELEASE, pack_number(number), LOAD_BYTES, _one_load
         )
         self._loads = loads
@@ -152,13 +162,13 @@ class TcpLink:
         """Return what the body did to each frame in the last step."""
         if self._loads is None:
             limit = LOAD_BYTES * MAX_FRAMES
-            self._loads = self._connection.ask(MessageKind.FRAMES, b"", limit, unpack_all_loads)
+            self._loads = self._connection.request(MessageKind.FRAMES, b"", limit, unpack_all_loads)
         return self._loads
 
     def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
-        """Let the body touch rigid geoms; see `TissueLink.collide_with`."""
+        """Replace the geoms that the body touches; see `TissueLink.collide_with`."""
         expect_pose_of_each(poses, len(geoms))
-        self._connection.ask(MessageKind.COLLIDE, pack_geoms(geoms, poses), 0, _nothing)
+        self._connection.request(MessageKind.COLLIDE, pack_geoms(geoms, poses), 0, _nothing)
         self._geom_loads = no_geom_loads(len(geoms))
 
     def geom_loads(self) -> GeomLoads:
@@ -168,29 +178,31 @@ class TcpLink:
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
         limit = snapshot_bytes(self._n_nodes, self._n_tetrahedra)
-        return self._connection.ask(MessageKind.SNAPSHOT, b"", limit, unpack_snapshot)
+        return self._connection.request(MessageKind.SNAPSHOT, b"", limit, unpack_snapshot)
 
     def chunks(self) -> Chunks:
         """Return boxes that together hold the body, and the speed of its fastest node."""
-        return self._connection.ask(MessageKind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
+        return self._connection.request(MessageKind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
 
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
         limit = surface_bytes(self._n_tetrahedra)
-        return self._connection.ask(MessageKind.SURFACE, b"", limit, unpack_surface)
+        return self._connection.request(MessageKind.SURFACE, b"", limit, unpack_surface)
 
     def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
         """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
         limit, request = values_bytes(self._n_nodes), pack_quantity(quantity)
-        return self._connection.ask(MessageKind.VALUES, request, limit, unpack_values)
+        return self._connection.request(MessageKind.VALUES, request, limit, unpack_values)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
-        return self._connection.ask(MessageKind.PIECES, b"", PIECES_BYTES, unpack_pieces)
+        return self._connection.request(MessageKind.PIECES, b"", PIECES_BYTES, unpack_pieces)
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
-        return self._connection.ask(MessageKind.QUALITY, b"", CUT_REPORT_BYTES, unpack_cut_report)
+        return self._connection.request(
+            MessageKind.QUALITY, b"", CUT_REPORT_BYTES, unpack_cut_report
+        )
 
     def close(self) -> None:
         """Close the connection."""

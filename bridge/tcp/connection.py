@@ -5,15 +5,13 @@ import logging
 import socket
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from bridge.link import LinkError
-from bridge.tcp.address import is_loopback, parse_address
-from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
-from bridge.tcp.channel import LARGEST_PART, Channel
-from bridge.tcp.heartbeat import Heartbeat
-from bridge.tcp.keepalive import keep_alive
+from bridge.tcp.address import is_loopback, keep_alive, parse_address
+from bridge.tcp.channel import LARGEST_PART, NONCE_BYTES, Channel, direction_keys, new_nonce
 from bridge.tcp.messages.text import LARGEST_DESCRIPTION, LARGEST_ERROR, unpack_error
 from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
 
@@ -21,13 +19,19 @@ _logger = logging.getLogger(__name__)
 
 _Value = TypeVar("_Value")
 
+HEARTBEAT_SECONDS = 15.0
+"""Silence after which a client sends a request to keep its place [s]: a quarter of the limit."""
+
 CONNECT_SECONDS = 5.0
 """Longest wait for a connection [s]. On loopback it is there at once or not at all."""
+
 RETRY_SECONDS = 0.2
 """Time between two tries where a server may not listen yet [s]."""
+
 ANSWER_SECONDS = 60.0
 """Longest wait for an answer [s]. A step takes a millisecond, but the first steps of a newly
 installed server compile."""
+
 WAIT_SECONDS = 0.1
 """Time from one call of `while_waiting` to the next [s]: who presses Ctrl-C waits no longer."""
 
@@ -47,7 +51,7 @@ class Connection:
     """A connection to a server, for one request at a time. Not to be shared between threads.
 
     When the server refuses a request, the connection stays open; when it fails, it is closed. While
-    its owner pauses it says that it is there.
+    its owner pauses, its heartbeat keeps its place.
 
     Args:
         address: Address of the server, "HOST:PORT".
@@ -76,7 +80,7 @@ class Connection:
         self._turn = threading.Lock()  # of the owner and the heartbeat
         self._broken_by = ""
         self._heartbeat: Heartbeat | None = None
-        self._asked_at = time.monotonic()
+        self._requested_at = time.monotonic()
         self.while_waiting: Callable[[], object] = lambda: None
         """Called ten times a second while the owner waits for an answer. It may raise an error to
         end that; the connection can still be used, unless a request was only sent in part."""
@@ -100,14 +104,14 @@ class Connection:
             self._socket = None
 
     def show_presence(self, silence: float) -> bool:
-        """Say something if nothing was asked for so long [s]; return whether that is still due."""
+        """Send a request if none was sent for so long [s]; return whether that is still due."""
         if not self._turn.acquire(blocking=False):
             return True  # a request is under way
         try:
             if self._socket is None:
                 return False
-            if time.monotonic() - self._asked_at > silence:
-                self._asked(MessageKind.HELLO, b"", LARGEST_DESCRIPTION, lambda: None)
+            if time.monotonic() - self._requested_at > silence:
+                self._exchange(MessageKind.HELLO, b"", LARGEST_DESCRIPTION, lambda: None)
         except LinkError as error:
             if self._socket is None:
                 self._broken_by = str(error)
@@ -115,7 +119,7 @@ class Connection:
             self._turn.release()
         return self._socket is not None
 
-    def ask(
+    def request(
         self,
         kind: MessageKind,
         payload: bytes,
@@ -138,12 +142,13 @@ class Connection:
         if len(payload) > LARGEST_PART:
             raise LinkError(
                 f"a request of {len(payload):,} bytes for {self._where}; at most "
-                f"{LARGEST_PART:,} are allowed. Hold fewer points, or give meshes of fewer vertices"
+                f"{LARGEST_PART:,} are allowed. Attach fewer points, or give meshes of fewer "
+                "vertices"
             )
         while not self._turn.acquire(timeout=WAIT_SECONDS):
             self.while_waiting()
         try:
-            answer = self._asked(kind, payload, limit, self.while_waiting)
+            answer = self._exchange(kind, payload, limit, self.while_waiting)
             if answer.kind != (reply_kind or kind):
                 raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
             return unpack(answer.payload)
@@ -153,7 +158,7 @@ class Connection:
         finally:
             self._turn.release()
 
-    def _asked(
+    def _exchange(
         self, kind: MessageKind, payload: bytes, limit: int, while_waiting: Callable[[], object]
     ) -> Frame:
         """Send a request and return its reply, of which only the length is checked.
@@ -179,7 +184,7 @@ class Connection:
             self.close()
             raise LinkError(f"the link to {self._where} broke: {cause}") from cause
         finally:
-            self._asked_at = time.monotonic()
+            self._requested_at = time.monotonic()
         if error is not None:
             raise LinkError(f"{self._where} refused: {error}")
         return answer
@@ -193,7 +198,7 @@ class Connection:
                     try:
                         rest = rest[connection.send(rest) :]
                     except TimeoutError:
-                        wait.go_on()
+                        wait.end_piece()
         except BaseException:  # the server would take the next request for the rest of this one
             self.close()
             raise
@@ -204,7 +209,7 @@ class Connection:
         The server is authenticated too: without the key, the tag of its next reply would be wrong.
         """
         mine = new_nonce()
-        theirs = self.ask(
+        theirs = self.request(
             MessageKind.HELLO, mine, NONCE_BYTES, _checked_nonce, reply_kind=MessageKind.CHALLENGE
         )
         keys = direction_keys(key, mine, theirs)
@@ -224,7 +229,7 @@ class Connection:
                 try:
                     data = connection.recv(READ_BYTES)
                 except TimeoutError:
-                    wait.go_on()
+                    wait.end_piece()
                     continue
                 if not data:
                     raise ConnectionResetError("the other side has closed it")
@@ -257,7 +262,7 @@ class _Wait:
         if time.monotonic() > self._deadline:
             raise TimeoutError
 
-    def go_on(self) -> None:
+    def end_piece(self) -> None:
         """Do what is due after a piece."""
         self.check()
         self._while_waiting()
@@ -307,10 +312,10 @@ def _once_it_listens(
     """Return a connection to one of the addresses of a host, which may not listen yet.
 
     Args:
-        addresses: Those of the host.
+        addresses: Addresses of the host.
         seconds: Longest wait for each connection [s].
         patience: Longest wait for a host that refuses it [s].
-        missing: What it says meanwhile, once.
+        missing: Warning that is logged once meanwhile.
 
     Raises:
         OSError: no connection can be made.
@@ -334,3 +339,36 @@ def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:
         with contextlib.suppress(OSError):
             return socket.create_connection(where[:2], seconds)
     return socket.create_connection(addresses[-1][:2], seconds)
+
+
+class Pausing(Protocol):
+    """A client that may pause."""
+
+    def show_presence(self, silence: float) -> bool:
+        """Send a request if none was sent for so long [s]; return whether that is still due."""
+
+
+class Heartbeat:
+    """Calls a client's `show_presence` until it is closed, or there is no such client any more.
+
+    A process that hangs, or is stopped, has no heartbeat. One that pauses has.
+    """
+
+    def __init__(self, client: Pausing) -> None:
+        self._ended = threading.Event()
+        # A client that nobody refers to any more closes its connection: not to be kept alive.
+        threading.Thread(
+            target=_beat, args=(weakref.ref(client), self._ended), name="heartbeat", daemon=True
+        ).start()
+
+    def stop(self) -> None:
+        """End the thread, without waiting for it."""
+        self._ended.set()
+
+
+def _beat(client: "weakref.ref[Pausing]", ended: threading.Event) -> None:
+    while not ended.wait(HEARTBEAT_SECONDS / 4.0):
+        found = client()
+        if found is None or not found.show_presence(HEARTBEAT_SECONDS):
+            return
+        del found

@@ -5,9 +5,8 @@ import socket
 import time
 from collections.abc import Iterable
 
-from bridge.tcp.authentication import NONCE_BYTES, TAG_BYTES
-from bridge.tcp.channel import Channel
-from bridge.tcp.keepalive import keep_alive
+from bridge.tcp.address import keep_alive
+from bridge.tcp.channel import NONCE_BYTES, TAG_BYTES, Channel
 from bridge.tcp.wire import LARGEST_FRAME, Frame, MessageError
 
 HANDSHAKE_SECONDS = 2.0
@@ -15,8 +14,8 @@ HANDSHAKE_SECONDS = 2.0
 FRAME_SECONDS = 2.0
 """Longest time from the first to the last byte of a message [s]. On loopback: microseconds."""
 SILENCE_SECONDS = 60.0
-"""Longest time from one request of the client to the next [s]. Our clients say that they are there
-while they pause; see `heartbeat`."""
+"""Longest time from one request of the client to the next [s]. Our clients keep
+their place while they pause; see `connection.Heartbeat`."""
 SEND_SECONDS = 10.0
 """Longest time for a peer to read a reply, all its parts [s]. The largest is a gibibyte."""
 HANDSHAKE_BYTES = NONCE_BYTES + TAG_BYTES

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from bridge.led_frames import FrameLoad, FramePose
+from bridge.driven import FrameLoad, FramePose
 from bridge.tcp.wire import MessageError
 from tissue import FloatArray
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
     from tissue import BladeSweep, Tissue
 
 FARTHEST_IN_A_REQUEST = 100.0
-"""How far the edge, or a frame that is led, may move in a request, in mean node sizes of the body.
+"""How far the edge, or a driven frame, may move in a request, in mean node sizes of the body.
 The edge is followed in quarters of a node size, so that these are 400 increments, and 15 times as
 many where the step goes wrong and is repeated. In a frame of a millisecond a scalpel moves by a
 hundredth of a node size."""
@@ -24,7 +24,7 @@ LARGEST_SWEEP = 1000.0
 the mean node size; also its length, in node sizes. Points along the edge, some to a node size, are
 followed in each increment."""
 
-MOST_STEPS_ASKED = 1000
+MOST_STEPS_REQUESTED = 1000
 """Steps of the integrator in a request that are always allowed. A frame of the scenes takes 1 to
 20."""
 
@@ -51,7 +51,7 @@ class RequestLimits:
         Raises:
             MessageError: the step would take too long.
         """
-        most_steps = max(MOST_STEPS_ASKED, MOST_WORK / n_tetrahedra)
+        most_steps = max(MOST_STEPS_REQUESTED, MOST_WORK / n_tetrahedra)
         if dt > most_steps * self._step:
             raise MessageError(
                 f"a step of {dt:g} s, which takes some {dt / self._step:.4g} steps of the "
@@ -72,13 +72,13 @@ class RequestLimits:
             MessageError: one moves too far.
         """
         for i, (pose, load) in enumerate(zip(poses, before, strict=True)):
-            self._check_way(f"frame {i}", load.wrench.point, pose.origin)
+            self._check_path(f"frame {i}", load.wrench.point, pose.origin)
 
     def _check_sweep(self, sweep: BladeSweep) -> None:
         (tip_t0, heel_t0, _), (tip_t1, heel_t1, _) = sweep
         travel = max(
-            self._check_way("the tip of the blade", tip_t0, tip_t1),
-            self._check_way("the heel of the blade", heel_t0, heel_t1),
+            self._check_path("the tip of the blade", tip_t0, tip_t1),
+            self._check_path("the heel of the blade", heel_t0, heel_t1),
         )
         length = max(_distance(tip_t0, heel_t0), _distance(tip_t1, heel_t1))
         size = self._node_size
@@ -90,15 +90,15 @@ class RequestLimits:
                 "size. Take shorter steps, or a shorter blade"
             )
 
-    def _check_way(self, what: str, before: FloatArray, after: FloatArray) -> float:
+    def _check_path(self, what: str, before: FloatArray, after: FloatArray) -> float:
         """Return how far something moves [m]."""
-        way = _distance(before, after)
-        if not way <= self._farthest:
+        distance = _distance(before, after)
+        if not distance <= self._farthest:
             raise MessageError(
-                f"{what} moves by {way:.3g} m in one step; at most {self._farthest:.3g} m are "
+                f"{what} moves by {distance:.3g} m in one step; at most {self._farthest:.3g} m are "
                 f"allowed, {FARTHEST_IN_A_REQUEST:g} times the mean node size. Take shorter steps"
             )
-        return way
+        return distance
 
 
 def _distance(a: FloatArray, b: FloatArray) -> float:

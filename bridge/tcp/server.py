@@ -1,4 +1,4 @@
-"""The server's end of the TCP link: holds a tissue for another process.
+"""The server's end of the TCP link: serves a tissue to another process.
 
 It serves one client at a time, with a new tissue for each, so that every run starts the same.
 """
@@ -13,7 +13,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from bridge.link import InProcessLink, SceneView
-from bridge.scene_names import sent_scene_name
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
 from bridge.tcp.messages.chunks import pack_chunks
@@ -22,13 +21,13 @@ from bridge.tcp.messages.geoms import unpack_geoms
 from bridge.tcp.messages.led_frames import (
     MAX_FRAMES,
     pack_loads,
-    unpack_hold,
+    unpack_attachment,
     unpack_number,
     unpack_tie,
 )
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
-from bridge.tcp.messages.text import MAX_VIEWS, pack_description
+from bridge.tcp.messages.text import MAX_VIEWS, pack_description, sent_scene_name
 from bridge.tcp.messages.values import pack_values, unpack_quantity
 from bridge.tcp.request_limits import RequestLimits
 from bridge.tcp.single_client import SingleClientServer
@@ -54,8 +53,8 @@ def serve(
 
     Args:
         make_tissue: Function that makes the tissue for a client, the same every time.
-        scene: Name of what it makes, as the command line gives it; see `bridge.scene_names`.
-        views: Where that is to be looked at from.
+        scene: Name of what it makes, as the command line gives it; see `bridge.tcp.messages.text`.
+        views: Cameras of that scene.
         host: Host to listen on; without a key only loopback.
         port: Port to listen on; 0 for a free one.
         key: Key that a client must have too (`keys.read_key`); None to serve any client on this
@@ -84,7 +83,7 @@ class TissueServer(SingleClientServer):
     Args:
         make_tissue: Function that makes the tissue for a client, the same every time.
         scene: Name of what it makes, as the command line gives it.
-        views: Where that is to be looked at from.
+        views: Cameras of that scene.
         host: Host to listen on; without a key only loopback.
         port: Port to listen on; 0 for a free one.
         key: Key that a client must have too; None to serve any client on this machine.
@@ -135,13 +134,13 @@ class TissueServer(SingleClientServer):
             MessageError: the request is malformed or of an unknown kind.
         """
         if frame.kind == MessageKind.STEP:
-            return self._stepped(frame.payload)
+            return self._step(frame.payload)
         if frame.kind == MessageKind.ATTACH:
-            return self._added(partial(self._link.attach, unpack_hold(frame.payload)))
+            return self._add(partial(self._link.attach, unpack_attachment(frame.payload)))
         if frame.kind == MessageKind.TIE:
-            return self._added(partial(self._link.tie, unpack_tie(frame.payload)))
+            return self._add(partial(self._link.tie, unpack_tie(frame.payload)))
         if frame.kind == MessageKind.COLLIDE:
-            return self._touched(frame.payload)
+            return self._collide(frame.payload)
         if frame.kind == MessageKind.RELEASE:
             number = unpack_number(frame.payload, len(self._link.loads()))
             self._link.release(number)
@@ -166,7 +165,7 @@ class TissueServer(SingleClientServer):
             return pack_cut_report(self._link.cut_report())
         raise MessageError(f"there is no request of kind {frame.kind}")
 
-    def _stepped(self, payload: bytes) -> bytes:
+    def _step(self, payload: bytes) -> bytes:
         """Do a step, and return its result.
 
         Raises:
@@ -174,19 +173,19 @@ class TissueServer(SingleClientServer):
                 it; nothing has moved then.
         """
         link = self._link
-        sweep, dt, poses, geoms = unpack_step(payload, link.n_led, link.n_geoms)
+        sweep, dt, poses, geoms = unpack_step(payload, link.n_driven, link.n_geoms)
         self._limits.check_step(sweep, dt, link.tissue.n_tetrahedra)
         if poses:
-            self._limits.check_poses(poses, link.loads()[-link.n_led :])
+            self._limits.check_poses(poses, link.loads()[-link.n_driven :])
         with _refusals():
             result = link.step(sweep, dt, poses, geoms)
         return pack_result(result, link.loads(), link.geom_loads())
 
-    def _added(self, add: Callable[[], int]) -> bytes:
-        """Let a frame hold tissue, and return the load on it.
+    def _add(self, add: Callable[[], int]) -> bytes:
+        """Add a driven frame, and return the load on it.
 
         Raises:
-            MessageError: it cannot hold it so, or there are too many.
+            MessageError: the tissue refuses the frame, or there are too many.
         """
         if len(self._link.loads()) == MAX_FRAMES:
             raise MessageError(f"there are {MAX_FRAMES} frames, and there may be no more")
@@ -194,8 +193,8 @@ class TissueServer(SingleClientServer):
             number = add()
         return pack_loads(self._link.loads()[number:])
 
-    def _touched(self, payload: bytes) -> bytes:
-        """Let the tissue touch geoms, and return an empty reply.
+    def _collide(self, payload: bytes) -> bytes:
+        """Replace the geoms that the tissue touches, and return an empty reply.
 
         Raises:
             MessageError: the request is malformed, or the tissue cannot touch them.
@@ -208,7 +207,7 @@ class TissueServer(SingleClientServer):
 
 @contextlib.contextmanager
 def _refusals() -> Iterator[None]:
-    """Have what the tissue refuses be a request that is refused, and no failure of the server."""
+    """Turn what the tissue refuses into a refused request: it is no failure of the server."""
     try:
         yield
     except ValueError as error:
@@ -217,7 +216,7 @@ def _refusals() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _terminate_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM end the server as Ctrl-C does, even where a shell has disabled Ctrl-C."""
+    """End the server on SIGTERM as on Ctrl-C, even where a shell has disabled Ctrl-C."""
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, signal.default_int_handler) for number in numbers]
     try:

@@ -15,7 +15,7 @@ from typing import Self
 
 from bridge.link import LinkError
 from bridge.tcp.address import bound_socket, format_address
-from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
+from bridge.tcp.channel import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.messages.text import pack_error
 from bridge.tcp.peer import SEND_SECONDS, Peer
 from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, MessageKind, pack_frame
@@ -25,7 +25,7 @@ _logger = logging.getLogger(__name__)
 MAX_STRANGERS = 64
 """Largest number of open connections of peers that are not the client. So many newcomers must come
 between the connection of a client and its first message before it loses its place: of 8 it lost it
-when a busy machine let it wait for 80 ms."""
+when a busy machine delayed it by 80 ms."""
 
 _BACKLOG = 4 * MAX_STRANGERS
 """Connections that the system keeps until they are accepted. One that finds no room waits for a
@@ -82,7 +82,7 @@ class SingleClientServer(abc.ABC):
 
     @abc.abstractmethod
     def _forget_client(self) -> None:
-        """Do what is due when the client has left."""
+        """Reset what belongs to the client, which has left."""
 
     def __enter__(self) -> Self:
         return self
@@ -207,7 +207,7 @@ class SingleClientServer(abc.ABC):
         """Send the server's nonce, and require authentication tags from now on."""
         if len(frame.payload) != NONCE_BYTES:
             return self._refuse(
-                peer, "this server asks for a key: give the same one with --key FILE"
+                peer, "this server requires a key: give the same one with --key FILE"
             )
         nonce = new_nonce()
         peer.sequence = frame.sequence

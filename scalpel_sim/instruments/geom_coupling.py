@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bridge import Bridge, GeomLoads, GeomPoses, LedContact, TissueFrame, TouchedGeoms
+from bridge import Bridge, DrivenContact, GeomLoads, GeomPoses, TissueFrame, TouchedGeoms
 from scalpel_sim.arm.blade import about_centre_of_mass
 from scalpel_sim.arm.collision_geoms import WORLD
 from scalpel_sim.instruments.grip import body_number, frame_of
@@ -96,7 +96,7 @@ class GeomCoupling:
         self._of_tissue: FloatArray = np.zeros((model.nbody, 6))
         geoms = [_geom(model, i) for i in self.geom_ids]
         self._poses = self._poses_now()
-        self._contact: TouchedGeoms | LedContact
+        self._contact: TouchedGeoms | DrivenContact
         if isinstance(tissue, Bridge):
             self._contact = tissue.collide_with(geoms, self._poses)
         else:

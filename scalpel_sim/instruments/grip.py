@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from bridge import Bridge, LedGrip, TissueFrame
+from bridge import Bridge, DrivenFrame, TissueFrame
 from scalpel_sim.arm.blade import about_centre_of_mass
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
@@ -71,7 +71,7 @@ class Grip:
         self._axes_at_first = self._of_body().axes.copy()
         origin = frame.points_to_tissue(self._of_body().position).tolist()
         numbers = {"stiffness": stiffness, "damping": damping, "breaks_at": breaks_at}
-        self.attachment: Attachment | LedGrip
+        self.attachment: Attachment | DrivenFrame
         """Attachment of the tissue, in its frame."""
         self.attachment = tissue.attach(where, **numbers, origin=origin)
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bridge import Bridge, GeomLoads, GeomPoses, InProcessLink, VirtualCoupling
-from bridge.led_geoms import mean_geom_loads
+from bridge.driven import mean_geom_loads
 from tests.bridge.bits import bits
-from tests.bridge.test_led_frames import CUBE, DT, FAR, cube
+from tests.bridge.test_driven import CUBE, DT, FAR, cube
 from tissue import Geom, fixed_nodes
 
 BALL = Geom("ball", "sphere", (0.004,), 0.3)
@@ -51,9 +51,9 @@ def test_a_wrong_number_of_geoms_is_refused_and_nothing_moves(n):
     link.collide_with(BOTH, places(0))
     before = bits(link.snapshot())
     poses = GeomPoses(np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)))
-    with pytest.raises(ValueError, match="and 2 geoms are led from here"):
+    with pytest.raises(ValueError, match="and 2 geoms are driven from here"):
         link.step(None, DT, (), poses)
-    with pytest.raises(ValueError, match="and 2 geoms are led from here"):
+    with pytest.raises(ValueError, match="and 2 geoms are driven from here"):
         link.collide_with(BOTH, poses)
     assert bits(link.snapshot()) == before
 
@@ -120,7 +120,7 @@ def test_what_is_made_while_an_answer_is_due_takes_the_next_one():
         ([[0.0, np.nan, 0.0]], [np.eye(3)], r"origin of geom 'ball' is \[0.0, nan, 0.0\]"),
         ([[0.0, 0.0, 0.0]], [2.0 * np.eye(3)], "rotation of geom 'ball' is"),
         ([[0.0, 0.0, 0.0]], [-np.eye(3)], "rotation of geom 'ball' is"),
-        ([0.0, 0.0, 0.0], [np.eye(3)], "1 geoms are led from here"),
+        ([0.0, 0.0, 0.0], [np.eye(3)], "1 geoms are driven from here"),
     ],
 )
 def test_a_pose_that_is_none_is_refused_before_the_tissue_moves(origins, rotations, expected):

@@ -1,10 +1,17 @@
 import pytest
 
-from bridge.device.messages import pack_device_description, unpack_device_description
-from bridge.device.values import DeviceDescription
+from bridge.device.messages import (
+    DeviceDescription,
+    pack_device_description,
+    unpack_device_description,
+)
 from bridge.link import InProcessLink
-from bridge.scene_names import is_scene_name, sent_scene_name
-from bridge.tcp.messages.text import pack_description, unpack_description
+from bridge.tcp.messages.text import (
+    is_scene_name,
+    pack_description,
+    sent_scene_name,
+    unpack_description,
+)
 from bridge.tcp.wire import MessageError
 from tests.bridge.tcp.serve_block import block_tissue
 

@@ -15,12 +15,10 @@ from functools import cache
 import numpy as np
 
 from bridge import DeviceDescription, DeviceServer
-from bridge.device.messages import ServoRequest, pack_servo, unpack_state
-from bridge.device.values import CartesianPose
+from bridge.device.messages import CartesianPose, ServoRequest, pack_servo, unpack_state
 from bridge.link import InProcessLink
 from bridge.tcp.address import parse_address
-from bridge.tcp.authentication import direction_keys, new_nonce
-from bridge.tcp.channel import Channel
+from bridge.tcp.channel import Channel, direction_keys, new_nonce
 from bridge.tcp.messages.result import unpack_result
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import unpack_error
@@ -303,7 +301,7 @@ def _damaged_request(client: Talker, random: np.random.Generator) -> tuple[int, 
 
 
 class CheckedBlade:
-    """What a device leads, as `LedByDevice`: it accepts nothing that a blade could not do."""
+    """What a device drives, as `DrivenBlade`: it accepts nothing that a blade could not do."""
 
     def servo_cp(self, pose: CartesianPose, *, holds: bool) -> None:
         assert holds in (True, False)

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from bridge.led_geoms import NO_GEOM_LOADS, GeomLoads, GeomPoses
+from bridge.driven import NO_GEOM_LOADS, GeomLoads, GeomPoses
 from bridge.tcp.messages.poses import checked_poses
 from bridge.tcp.wire import MessageError
 from tissue import LARGEST_COORDINATE, FloatArray, Geom

@@ -7,7 +7,7 @@ from typing import Annotated, TypeVar
 
 import msgspec
 
-from bridge.led_frames import FrameHold, FrameLoad, FrameTie
+from bridge.driven import FrameAttachment, FrameLoad, FrameTie
 from bridge.tcp.wire import LARGEST_REPLY, MessageError
 from tissue import LARGEST_COORDINATE, LARGEST_STRENGTH, Wrench
 
@@ -42,7 +42,7 @@ class _Held(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
     @property
     def where(self) -> _Where:
-        """Return what `FrameHold.where` takes.
+        """Return what `FrameAttachment.where` takes.
 
         Raises:
             MessageError: none of them says it, or several.
@@ -79,19 +79,19 @@ _hold_decoder = msgspec.json.Decoder(_FrameHold)
 _tie_decoder = msgspec.json.Decoder(_FrameTie)
 
 
-def pack_hold(hold: FrameHold) -> bytes:
+def pack_attachment(hold: FrameAttachment) -> bytes:
     """Return the request to attach a frame, JSON."""
     return _packed(hold.where, hold.breaks_at, hold)
 
 
-def unpack_hold(payload: bytes) -> FrameHold:
+def unpack_attachment(payload: bytes) -> FrameAttachment:
     """Return what a request to attach a frame asks for.
 
     Raises:
         MessageError: it cannot be read, or says in no way or several what is held.
     """
     found = _decoded(_hold_decoder, payload, "attach")
-    return FrameHold(found.where, found.stiffness, found.damping, found.limit, found.origin)
+    return FrameAttachment(found.where, found.stiffness, found.damping, found.limit, found.origin)
 
 
 def pack_tie(tie: FrameTie) -> bytes:
@@ -103,7 +103,7 @@ def unpack_tie(payload: bytes) -> FrameTie:
     """Return what a request to tie a frame asks for.
 
     Raises:
-        MessageError: see `unpack_hold`.
+        MessageError: see `unpack_attachment`.
     """
     found = _decoded(_tie_decoder, payload, "tie")
     return FrameTie(
@@ -118,7 +118,7 @@ def unpack_tie(payload: bytes) -> FrameTie:
     )
 
 
-def _packed(where: _Where, breaks_at: float, asked: FrameHold | FrameTie) -> bytes:
+def _packed(where: _Where, breaks_at: float, asked: FrameAttachment | FrameTie) -> bytes:
     """Return a request, with what is held under the name of its kind."""
     found: dict[str, object] = asked._asdict()
     del found["where"]

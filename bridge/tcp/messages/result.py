@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridge.led_frames import FrameLoad
-from bridge.led_geoms import NO_GEOM_LOADS, GeomLoads
+from bridge.driven import NO_GEOM_LOADS, FrameLoad, GeomLoads
 from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.messages.geoms import (
     GEOM_LOAD_BYTES,

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridge.led_frames import FramePose
-from bridge.led_geoms import NO_GEOMS, GeomPoses
+from bridge.driven import NO_GEOMS, FramePose, GeomPoses
 from bridge.tcp.messages.poses import POSE_BYTES, checked_poses, pack_poses
 from bridge.tcp.wire import MessageError
 from tissue import LARGEST_COORDINATE, BladeSegment, BladeSweep
@@ -45,19 +44,19 @@ def pack_step(
 
 
 def unpack_step(
-    payload: bytes, n_led: int = 0, n_geoms: int = 0
+    payload: bytes, n_driven: int = 0, n_geoms: int = 0
 ) -> tuple[BladeSweep | None, float, Sequence[FramePose], GeomPoses]:
-    """Return the sweep, `dt`, and the poses of `n_led` frames and `n_geoms` geoms in a request.
+    """Return the sweep, `dt`, and the poses of `n_driven` frames and `n_geoms` geoms in a request.
 
     Raises:
         MessageError: a number is missing, not finite, or out of range.
     """
-    of_poses = (n_led + n_geoms) * POSE_BYTES
+    of_poses = (n_driven + n_geoms) * POSE_BYTES
     has_blade = len(payload) == _TIME.size + _BLADE.size + of_poses
     if not has_blade and len(payload) != _TIME.size + of_poses:
         raise MessageError(
             f"a step request of {len(payload)} bytes; wanted {_TIME.size}, or with a blade "
-            f"{_TIME.size + _BLADE.size}, and {POSE_BYTES} for each of {n_led} frames and "
+            f"{_TIME.size + _BLADE.size}, and {POSE_BYTES} for each of {n_driven} frames and "
             f"{n_geoms} geoms that are led"
         )
     (dt,), at = _TIME.unpack_from(payload), _TIME.size
@@ -73,10 +72,10 @@ def unpack_step(
     geoms = NO_GEOMS
     if of_poses:
         rows = np.frombuffer(payload, "<f8", offset=at).astype(np.float64).reshape(-1, 12)
-        origins, rotations = checked_poses(rows, n_led)
-        of_frames = zip(origins[:n_led], rotations[:n_led], strict=True)
+        origins, rotations = checked_poses(rows, n_driven)
+        of_frames = zip(origins[:n_driven], rotations[:n_driven], strict=True)
         frames = [FramePose(*pose) for pose in of_frames]
-        geoms = GeomPoses(origins[n_led:], rotations[n_led:])
+        geoms = GeomPoses(origins[n_driven:], rotations[n_driven:])
     return sweep, _checked_step(dt), frames, geoms
 
 

@@ -1,23 +1,46 @@
 """The messages of text: the description of the tissue (JSON) and an error (plain UTF-8)."""
 
 import math
+import re
 from typing import Annotated
 
 import msgspec
 import numpy as np
 
 from bridge.link import SceneView, TissueDescription
-from bridge.scene_names import WANTED_NAME, is_scene_name
 from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.wire import MessageError
 from tissue import BladeShape, Material
 
 LARGEST_ERROR = 1 << 16
 """Largest error [byte]: text for a person to read."""
+
 LARGEST_DESCRIPTION = 1 << 18
 """Largest description [byte]: a name, a dozen numbers, and the views, of some 300 bytes each."""
+
 MAX_VIEWS = 256
 """Largest number of views of a scene: more than anyone looks for in a list."""
+
+LONGEST_NAME = 64
+"""Longest name [characters]."""
+
+WANTED_NAME = f"1 to {LONGEST_NAME} letters, digits, underscores and dashes"
+"""What a name is, for messages."""
+
+_NAME = re.compile(f"[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}")
+
+_UNNAMED = "tissue"
+
+
+def is_scene_name(name: str) -> bool:
+    """Return whether another process may call its scene that."""
+    return _NAME.fullmatch(name) is not None
+
+
+def sent_scene_name(name: str) -> str:
+    """Return a name as another process gets it: what may not be in one is an underscore there."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", name)[:LONGEST_NAME] or _UNNAMED
+
 
 _Place = tuple[float, float, float]
 

@@ -4,7 +4,7 @@ import fcl
 import numpy as np
 import pytest
 
-from bridge.collision.arm_geoms import ArmGeom
+from bridge.collision.collisions import ArmGeom
 
 
 @pytest.mark.parametrize(

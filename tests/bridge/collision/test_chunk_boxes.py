@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.collision.chunk_boxes import ChunkBoxes, not_separated
+from bridge.collision.broad_phase import ChunkBoxes, not_separated
 from bridge.collision.collision_objects import MovableBox
 from bridge.collision.swept_box import box_around
 

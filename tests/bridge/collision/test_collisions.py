@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import FixtureBox, FixtureMesh
-from bridge.collision.arm_geoms import ArmGeom
-from bridge.collision.collisions import Collisions
+from bridge.collision.collisions import ArmGeom, Collisions
 
 TABLE = FixtureBox("table", np.array([1.0, 1.0, 0.02]), np.array([0.0, 0.0, -0.01]))
 SHEET = FixtureMesh(

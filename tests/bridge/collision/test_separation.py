@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.collision.collision_objects import MovableBox, are_colliding
-from bridge.collision.separation import gap_between
-from bridge.collision.swept_box import SweptBox
+from bridge.collision.swept_box import SweptBox, gap_between
 
 numbers = st.floats(-1.0, 1.0)
 vectors = st.tuples(numbers, numbers, numbers).map(np.array)

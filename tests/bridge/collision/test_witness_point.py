@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from bridge.collision import broad_phase, chunk_boxes
+from bridge.collision import broad_phase
 from bridge.collision.broad_phase import BroadPhase
-from bridge.collision.witness_point import WitnessPoint
+from bridge.collision.coherence import WitnessPoint
 from bridge.poses import pose_of
-from tests.bridge.collision.test_separating_axis import BOX, DT, random_path
+from tests.bridge.collision.test_coherence import BOX, DT, random_path
 from tissue import BladeSegment, BladeShape, Chunks
 
 SOUND_SPEED = 3.0
@@ -20,11 +20,8 @@ SHAPES = [None, BladeShape()]
 def n_compared(monkeypatch):
     """Count how often boxes are compared by the collision library."""
     calls = []
-    for module in (broad_phase, chunk_boxes):
-        real = module.are_colliding
-        monkeypatch.setattr(
-            module, "are_colliding", lambda *a, real=real: (calls.append(1), real(*a))[1]
-        )
+    real = broad_phase.are_colliding
+    monkeypatch.setattr(broad_phase, "are_colliding", lambda *a: (calls.append(1), real(*a))[1])
     return lambda: len(calls)
 
 

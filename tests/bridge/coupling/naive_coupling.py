@@ -3,8 +3,13 @@
 import numpy as np
 
 from bridge.arithmetic import ENERGY_TOLERANCE
-from bridge.coupling.coupling import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
-from bridge.coupling.watchdog import DECAY_AFTER, RAMP, ZERO_AFTER
+from bridge.coupling.coupling import (
+    DECAY_AFTER,
+    MAX_PLAUSIBLE_FORCE,
+    MAX_PLAUSIBLE_TORQUE,
+    RAMP,
+    ZERO_AFTER,
+)
 
 
 class NaiveCoupling:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridge.coupling.impulse import ImpulseCompensation
+from bridge.coupling.local_model import ImpulseCompensation
 from tissue import BladeSegment, Wrench
 
 DT = 1e-3

@@ -47,7 +47,7 @@ def until_answered(query):
 
 def test_a_query_that_waits_has_its_answer():
     query = Query(wall(), waits=True)
-    query.ask([TimedSweep(BladeSweep(at(0.0), at(1e-3)), DT)], at(1e-3))
+    query.start([TimedSweep(BladeSweep(at(0.0), at(1e-3)), DT)], at(1e-3))
     assert query.is_pending
     answer = query.take_answer()
     assert answer.result.wrench_t1.force[1] == pytest.approx(-1.0)
@@ -57,7 +57,7 @@ def test_a_query_that_waits_has_its_answer():
 def test_a_query_that_does_not_wait_has_no_answer_until_it_arrives():
     slow = SlowWall()
     query = Query(slow, waits=False)
-    query.ask([TimedSweep(BladeSweep(at(0.0), at(1e-3)), DT)], at(1e-3))
+    query.start([TimedSweep(BladeSweep(at(0.0), at(1e-3)), DT)], at(1e-3))
     assert query.take_answer() is None and query.is_pending
     slow.may_answer.set()
     assert until_answered(query).result.wrench_t1.force[1] == pytest.approx(-1.0)
@@ -69,7 +69,7 @@ def test_the_loss_of_a_tissue_is_raised_where_the_answer_is_taken():
             raise LinkError("the server is gone")
 
     query = Query(Lost(np.zeros(3), BACK, 1e3), waits=False)
-    query.ask([TimedSweep(None, DT)], at(0.0))
+    query.start([TimedSweep(None, DT)], at(0.0))
     with pytest.raises(LinkError, match="the server is gone"):
         until_answered(query)
 
@@ -83,7 +83,7 @@ def test_a_path_in_parts_gets_one_answer_with_its_mean_wrench():
         for a, b, dt in zip(depths[:-1], depths[1:], seconds, strict=True)
     ]
     query = Query(tissue, waits=True)
-    query.ask(path, at(depths[-1]))
+    query.start(path, at(depths[-1]))
     result = query.take_answer().result
     assert result.wrench.force * sum(seconds) == pytest.approx(tissue.impulse)
     means = -1e3 * 0.5 * (depths[:-1] + depths[1:])

@@ -2,7 +2,7 @@ import itertools
 
 import pytest
 
-from bridge.coupling.watchdog import DECAY_AFTER, RAMP, WARN_AFTER, ZERO_AFTER, Watchdog
+from bridge.coupling.coupling import DECAY_AFTER, RAMP, WARN_AFTER, ZERO_AFTER, Watchdog
 
 DT = 1e-3
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridge.led_geoms import GeomLoads, no_geom_loads
+from bridge.driven import GeomLoads, no_geom_loads
 from bridge.link import TissueDescription
 from tissue import (
     BladeSegment,

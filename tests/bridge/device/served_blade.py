@@ -23,7 +23,7 @@ STATE = DeviceState(
 
 
 class NotedBlade:
-    """Notes what is asked of it, as `LedByDevice`."""
+    """Notes what is asked of it, as `DrivenBlade`."""
 
     def __init__(self):
         self.asked = []

@@ -176,7 +176,7 @@ def test_a_device_that_reads_no_replies_is_dropped_and_delays_no_frame(served):
 
 
 def test_a_tissue_is_not_taken_for_a_run_nor_a_run_for_a_tissue(served, server):
-    with pytest.raises(LinkError, match="no run that a device leads"):
+    with pytest.raises(LinkError, match="no run that a device drives"):
         DeviceClient(server.address)
     with pytest.raises(LinkError, match="description cannot be read"):
         TcpLink(served[1])
@@ -227,7 +227,7 @@ def test_a_device_whose_patience_ends_says_that_there_is_no_run(monkeypatch):
 def test_the_client_prints_why_the_run_refuses_it():
     with served_blade(KEY) as (_, address):
         done = run_example(address)
-    assert done.returncode == 1 and "this server asks for a key" in done.stderr
+    assert done.returncode == 1 and "this server requires a key" in done.stderr
 
 
 def run_example(address):

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.tcp.authentication import TAG_BYTES, Authenticator, direction_keys, new_nonce
+from bridge.tcp.channel import TAG_BYTES, Authenticator, direction_keys, new_nonce
 from bridge.tcp.wire import Frame, MessageError, MessageKind
 
 KEY = bytes(range(32))

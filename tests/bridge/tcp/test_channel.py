@@ -2,8 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.tcp.authentication import direction_keys
-from bridge.tcp.channel import LARGEST_PART, Channel
+from bridge.tcp.channel import LARGEST_PART, Channel, direction_keys
 from bridge.tcp.wire import (
     HEADER_BYTES,
     LARGEST_FRAME,

@@ -10,7 +10,8 @@ import time
 import numpy as np
 import pytest
 
-from bridge import Bridge, FrameHold, FramePose, InProcessLink, LinkError, SceneView, TcpLink
+from bridge import Bridge, InProcessLink, LinkError, SceneView, TcpLink
+from bridge.driven import FrameAttachment, FramePose
 from bridge.tcp.address import parse_address
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import pack_step
@@ -296,7 +297,7 @@ def test_a_reply_about_other_frames_than_there_are_breaks_the_link(monkeypatch):
     server = TissueServer(make_block, port=0)
     threading.Thread(target=server.run, daemon=True).start()
     with contextlib.closing(TcpLink(server.address)) as link:
-        link.attach(FrameHold("top", 100.0))
+        link.attach(FrameAttachment("top", 100.0))
         monkeypatch.setattr("bridge.tcp.server.pack_result", lambda result, *_: pack_result(result))
         at = FramePose(np.array([0.01, 0.01, 0.02]), np.eye(3))
         with pytest.raises(LinkError, match="loads on 0 frames; there are 1"):

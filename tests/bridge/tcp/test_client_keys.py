@@ -9,8 +9,7 @@ import pytest
 
 from bridge import LinkError, TcpLink
 from bridge.tcp.address import parse_address
-from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
-from bridge.tcp.channel import Channel
+from bridge.tcp.channel import NONCE_BYTES, Channel, direction_keys, new_nonce
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import unpack_error
 from bridge.tcp.server import TissueServer
@@ -45,7 +44,7 @@ def test_a_client_with_another_key_is_refused(server):
 
 
 def test_a_client_without_a_key_is_refused(server):
-    with pytest.raises(LinkError, match="refused: this server asks for a key"):
+    with pytest.raises(LinkError, match="refused: this server requires a key"):
         TcpLink(server.address)
     assert_serves(server, KEY)
 

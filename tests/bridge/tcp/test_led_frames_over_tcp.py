@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from bridge import Bridge, FrameHold, FrameTie, InProcessLink, LinkError, TcpLink
+from bridge import Bridge, InProcessLink, LinkError, TcpLink
+from bridge.driven import FrameAttachment, FrameTie
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.server import TissueServer
 from bridge.tcp.wire import FrameReader, MessageKind, pack_frame
@@ -16,7 +17,7 @@ from scalpel_sim import Grip
 from tests.bridge.bits import bits
 from tests.bridge.tcp.bare_sockets import DT, connected_client, link_once_free
 from tests.bridge.tcp.serve_block import block_tissue
-from tests.bridge.test_led_frames import FAR, pose
+from tests.bridge.test_driven import FAR, pose
 
 JAW = """
 <mujoco>
@@ -121,8 +122,8 @@ def test_a_jaw_of_mujoco_holds_tissue_over_any_link(link):
 
 
 def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):
-    link.attach(FrameHold("top", 100.0))
-    with pytest.raises(ValueError, match="poses of 0 frames, and 1 are led"):
+    link.attach(FrameAttachment("top", 100.0))
+    with pytest.raises(ValueError, match="poses of 0 frames, and 1 are driven"):
         link.step(None, DT)
     assert link.step(None, DT, [pose(0)]).n_tetrahedra == 72
 
@@ -130,11 +131,11 @@ def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):
 @pytest.mark.parametrize(
     ("hold", "expected"),
     [
-        (FrameHold("tpo", 100.0), "Did you mean 'top'"),
-        (FrameHold("top", -1.0), "stiffness is -1.0"),
-        (FrameHold("top", np.nan), "Expected `float`, got `null` - at `\\$.stiffness`"),
-        (FrameHold([1000], 100.0), "there is no node 1000"),
-        (FrameHold([[9.0, 9.0, 9.0]], 100.0), "outside the body"),
+        (FrameAttachment("tpo", 100.0), "Did you mean 'top'"),
+        (FrameAttachment("top", -1.0), "stiffness is -1.0"),
+        (FrameAttachment("top", np.nan), "Expected `float`, got `null` - at `\\$.stiffness`"),
+        (FrameAttachment([1000], 100.0), "there is no node 1000"),
+        (FrameAttachment([[9.0, 9.0, 9.0]], 100.0), "outside the body"),
     ],
 )
 def test_what_cannot_be_held_is_refused_and_the_link_stays(link, hold, expected):
@@ -174,7 +175,7 @@ def test_more_frames_than_there_may_be_are_refused(monkeypatch):
     with contextlib.closing(TcpLink(server.address)) as other:
         other.tie(STRANDS)
         with pytest.raises(LinkError, match="there are 1 frames, and there may be no more"):
-            other.attach(FrameHold("top", 100.0))
+            other.attach(FrameAttachment("top", 100.0))
 
 
 def test_a_frame_that_is_not_there_is_not_released(link):
@@ -211,13 +212,13 @@ def test_each_client_gets_a_tissue_that_nobody_holds(server):
     for _ in range(2):
         with contextlib.closing(link_once_free(server.address)) as link:
             assert isinstance(link, TcpLink) and len(link.loads()) == 0
-            link.attach(FrameHold("top", 100.0))
+            link.attach(FrameAttachment("top", 100.0))
 
 
 @pytest.mark.parametrize("wrong", [1e308, -1e308, 1e10])
 def test_a_frame_that_holds_with_an_impossible_stiffness_is_refused(server, wrong):
     with contextlib.closing(link_once_free(server.address)) as link:
         with pytest.raises(LinkError, match="the request to attach a frame cannot be read"):
-            link.attach(FrameHold("top", wrong))
+            link.attach(FrameAttachment("top", wrong))
         assert link.loads() == []
         assert link.step(None, 1e-3).n_tetrahedra == 72

@@ -103,7 +103,7 @@ def test_geoms_of_all_shapes_push_the_block_away_from_them(link):
 
 def test_a_wrong_number_of_geoms_is_refused_and_the_link_stays(link):
     link.collide_with(GEOMS, places(0))
-    with pytest.raises(ValueError, match="and 7 geoms are led from here"):
+    with pytest.raises(ValueError, match="and 7 geoms are driven from here"):
         link.step(None, DT)
     assert link.step(None, DT, (), places(1)).n_tetrahedra == 72
 

@@ -13,8 +13,9 @@ import time
 import pytest
 
 from bridge import DeviceClient, LinkError, TcpLink
-from bridge.tcp import heartbeat, keepalive, peer
-from bridge.tcp.address import parse_address
+from bridge.tcp import connection as client_connection
+from bridge.tcp import peer
+from bridge.tcp.address import N_PROBES, parse_address
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import unpack_error
 from bridge.tcp.server import TissueServer
@@ -63,7 +64,7 @@ def server_in_a_thread(**options):
 @pytest.fixture
 def short_silence(monkeypatch):
     monkeypatch.setattr(peer, "SILENCE_SECONDS", SILENCE)
-    monkeypatch.setattr(heartbeat, "HEARTBEAT_SECONDS", SILENCE / 4.0)
+    monkeypatch.setattr(client_connection, "HEARTBEAT_SECONDS", SILENCE / 4.0)
 
 
 # ---- connections that are no client --------------------------------------------------------------
@@ -204,7 +205,7 @@ def test_both_ends_ask_whether_the_other_machine_is_still_there():
             assert end.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
             assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE) == 10
             assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL) == 5
-            assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT) == keepalive.N_PROBES
+            assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT) == N_PROBES
 
 
 # ---- Ctrl-C while waiting ------------------------------------------------------------------------
@@ -268,4 +269,4 @@ def test_a_request_that_was_sent_in_part_ends_the_link(silent_server):
     with pytest.raises(LinkError, match="is closed"):
         for _ in range(100):  # until the system takes no more
             with contextlib.suppress(KeyboardInterrupt):
-                connection.ask(MessageKind.COLLIDE, bytes(1 << 19), 0, bytes)
+                connection.request(MessageKind.COLLIDE, bytes(1 << 19), 0, bytes)

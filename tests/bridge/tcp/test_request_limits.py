@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from bridge import FrameHold, FramePose, LinkError
-from bridge.led_geoms import GeomPoses
+from bridge import LinkError
+from bridge.driven import FrameAttachment, FramePose, GeomPoses
 from tests.bridge.bits import bits
 from tests.bridge.tcp.bare_sockets import DT, link_once_free
 from tissue import BladeSweep, Geom
@@ -59,7 +59,7 @@ def test_a_blade_that_moves_as_far_as_is_allowed_is_served(link, upright):
 
 
 def test_a_frame_that_is_led_too_far_is_refused(link):
-    link.attach(FrameHold("top", 100.0))
+    link.attach(FrameAttachment("top", 100.0))
     at = np.array([0.01, 0.01, 0.02])
     near = [FramePose(at, np.eye(3))]
     link.step(None, DT, near)
@@ -83,7 +83,7 @@ def test_a_step_of_more_integrator_steps_than_are_allowed_is_refused(monkeypatch
     from tests.bridge.tcp.test_places import server_in_a_thread
 
     monkeypatch.setattr(request_limits, "MOST_WORK", 0.0)
-    monkeypatch.setattr(request_limits, "MOST_STEPS_ASKED", 100)
+    monkeypatch.setattr(request_limits, "MOST_STEPS_REQUESTED", 100)
     with (
         server_in_a_thread() as server,
         contextlib.closing(link_once_free(server.address)) as link,
@@ -96,12 +96,12 @@ def test_a_step_of_more_integrator_steps_than_are_allowed_is_refused(monkeypatch
 
 
 def test_a_body_of_many_tetrahedra_may_take_a_thousand_steps_at_least():
-    from bridge.tcp.request_limits import MOST_STEPS_ASKED, RequestLimits
+    from bridge.tcp.request_limits import MOST_STEPS_REQUESTED, RequestLimits
     from bridge.tcp.wire import MessageError
     from tests.bridge.tcp.serve_block import block_tissue
 
     tissue = block_tissue()
-    longest = MOST_STEPS_ASKED * tissue.cut_report().initial.time_step
+    longest = MOST_STEPS_REQUESTED * tissue.cut_report().initial.time_step
     limits = RequestLimits(tissue)
     limits.check_step(None, 0.99 * longest, 10**9)
     with pytest.raises(MessageError):

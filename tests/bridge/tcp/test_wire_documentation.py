@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from bridge.device.messages import pack_state
-from bridge.scene_names import WANTED_NAME
-from bridge.tcp.address import parse_address
-from bridge.tcp.authentication import Authenticator, direction_keys
-from bridge.tcp.keepalive import IDLE_SECONDS, N_PROBES, PROBE_SECONDS
+from bridge.tcp.address import IDLE_SECONDS, N_PROBES, PROBE_SECONDS, parse_address
+from bridge.tcp.channel import Authenticator, direction_keys
 from bridge.tcp.messages.geoms import MAX_GEOMS
 from bridge.tcp.messages.result import pack_result
-from bridge.tcp.messages.text import MAX_VIEWS
+from bridge.tcp.messages.text import MAX_VIEWS, WANTED_NAME
 from bridge.tcp.peer import (
     FRAME_SECONDS,
     HANDSHAKE_BYTES,
@@ -26,7 +24,7 @@ from bridge.tcp.peer import (
 from bridge.tcp.request_limits import (
     FARTHEST_IN_A_REQUEST,
     LARGEST_SWEEP,
-    MOST_STEPS_ASKED,
+    MOST_STEPS_REQUESTED,
     MOST_WORK,
 )
 from bridge.tcp.single_client import MAX_STRANGERS
@@ -75,7 +73,7 @@ def test_the_client_waits_for_a_server_that_gets_ready_meanwhile():
 def test_the_client_prints_why_the_server_refuses_it(start_server):
     server = start_server(key=bytes(32))
     done = run_client(parse_address(server.address)[1])
-    assert done.returncode == 1 and "this server asks for a key" in done.stderr
+    assert done.returncode == 1 and "this server requires a key" in done.stderr
 
 
 def test_the_numbers_of_a_state_are_where_the_table_says():
@@ -115,7 +113,7 @@ def test_the_limits_are_those_of_the_server():
     assert f"has not answered the system for {gone} s" in WIRE
     assert f"more than {FARTHEST_IN_A_REQUEST:g} times the mean node size" in WIRE
     assert f"more than {LARGEST_SWEEP:,.0f} squares of the mean node size" in WIRE
-    assert f"more than {MOST_STEPS_ASKED:,} steps of the integrator" in WIRE
+    assert f"more than {MOST_STEPS_REQUESTED:,} steps of the integrator" in WIRE
     assert f"more than {MOST_WORK / 1e6:g} million" in WIRE
     assert f"{WANTED_NAME}" in WIRE
     assert f"at most {MAX_GEOMS}." in WIRE and f"more than {MOST_INCREMENTS:,}, is refused" in WIRE

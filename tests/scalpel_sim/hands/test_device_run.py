@@ -118,7 +118,7 @@ def test_a_device_needs_the_key_of_the_run(tmp_path):
     key = tmp_path / "device.key"
     write_new_key(key)
     with DeviceRunProcess("run", tmp_path / "led", "--listen-key", str(key)) as run:
-        with pytest.raises(LinkError, match="asks for a key"):
+        with pytest.raises(LinkError, match="requires a key"):
             DeviceClient(run.address)
         with DeviceClient(run.address, key=read_key(key)) as client:
             lead_forwards(client, 1e-3)

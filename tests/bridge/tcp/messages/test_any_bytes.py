@@ -7,7 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bridge import FrameHold, FrameLoad, FramePose, FrameTie, GeomLoads, GeomPoses
+from bridge import GeomLoads, GeomPoses
+from bridge.driven import FrameAttachment, FrameLoad, FramePose, FrameTie
 from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     pack_pieces,
@@ -21,11 +22,11 @@ from bridge.tcp.messages.chunks import pack_chunks, unpack_chunks
 from bridge.tcp.messages.cut_report import pack_cut_report, unpack_cut_report
 from bridge.tcp.messages.geoms import pack_geoms, unpack_geoms
 from bridge.tcp.messages.led_frames import (
-    pack_hold,
+    pack_attachment,
     pack_loads,
     pack_number,
     pack_tie,
-    unpack_hold,
+    unpack_attachment,
     unpack_loads,
     unpack_number,
     unpack_tie,
@@ -71,8 +72,8 @@ def real_messages():
         ),
         "geoms": (pack_geoms(GEOMS, PLACES), unpack_geoms),
         "hold": (
-            pack_hold(FrameHold([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))),
-            unpack_hold,
+            pack_attachment(FrameAttachment([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))),
+            unpack_attachment,
         ),
         "tie": (
             pack_tie(FrameTie([3, 4], [[0.0, 0.1, 0.2]], 100.0, 1e-6, 50.0, 1.0, 0.03, 2.0)),

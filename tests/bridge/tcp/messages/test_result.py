@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import GeomLoads
-from bridge.led_geoms import no_geom_loads
+from bridge.driven import no_geom_loads
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from bridge import FramePose, GeomPoses
-from bridge.led_geoms import NO_GEOMS
+from bridge import GeomPoses
+from bridge.driven import NO_GEOMS, FramePose
 from bridge.tcp.messages.step import pack_step, unpack_step
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bridge import Bridge, FrameHold, FramePose, InProcessLink, VirtualCoupling
-from bridge.led_frames import mean_wrench, plain_region
+from bridge import Bridge, InProcessLink, VirtualCoupling
+from bridge.driven import FrameAttachment, FramePose, mean_wrench, plain_region
 from tests.bridge.bits import bits
 from tissue import BladeSegment, BladeSweep, Material, Tissue, Wrench, block, fixed_nodes
 
@@ -27,7 +27,7 @@ def pose(i):
 
 def test_a_led_frame_acts_as_the_attachment_that_it_is():
     led, moved = InProcessLink(cube()), cube()
-    number = led.attach(FrameHold("top", 200.0, 2.0))
+    number = led.attach(FrameAttachment("top", 200.0, 2.0))
     attachment = moved.attach("top", stiffness=200.0, damping=2.0)
     assert number == 0 and led.loads()[0].n_points == 9
     for i in range(1, 30):
@@ -42,7 +42,7 @@ def test_frames_of_the_tissue_s_own_come_first_and_take_no_poses():
     tissue = cube()
     own = tissue.attach([[0.0, 0.0, 0.02]], stiffness=10.0)
     link = InProcessLink(tissue)
-    assert link.attach(FrameHold([[0.02, 0.02, 0.02]], 10.0)) == 1
+    assert link.attach(FrameAttachment([[0.02, 0.02, 0.02]], 10.0)) == 1
     link.step(None, DT, [FramePose(np.array([0.02, 0.02, 0.03]), np.eye(3))])
     assert [load.n_points for load in link.loads()] == [1, 1]
     assert link.loads()[1].wrench.force[2] < 0.0
@@ -52,7 +52,7 @@ def test_frames_of_the_tissue_s_own_come_first_and_take_no_poses():
 def test_a_released_frame_keeps_its_number_and_feels_nothing():
     link = InProcessLink(cube())
     for _ in range(2):
-        link.attach(FrameHold("top", 100.0))
+        link.attach(FrameAttachment("top", 100.0))
     link.step(None, DT, [pose(100)] * 2)
     link.release(0)
     link.release(0)
@@ -65,8 +65,8 @@ def test_a_released_frame_keeps_its_number_and_feels_nothing():
 @pytest.mark.parametrize("n", [0, 2])
 def test_a_wrong_number_of_frames_is_refused(n):
     link = InProcessLink(cube())
-    link.attach(FrameHold("top", 100.0))
-    with pytest.raises(ValueError, match=f"poses of {n} frames, and 1 are led"):
+    link.attach(FrameAttachment("top", 100.0))
+    with pytest.raises(ValueError, match=f"poses of {n} frames, and 1 are driven"):
         link.step(None, DT, [pose(0)] * n)
 
 
@@ -148,8 +148,8 @@ def test_where_the_tissue_is_asked_seldom_the_frames_go_as_they_were_led(changes
 @pytest.mark.parametrize(
     ("origin", "axes", "expected"),
     [
-        ([0.0, np.nan, 0.0], None, "origin of a grip is not finite"),
-        ([0.0, 0.0, 0.0], 2.0 * np.eye(3), "rotation of a grip is not orthonormal"),
+        ([0.0, np.nan, 0.0], None, "origin of a frame is not finite"),
+        ([0.0, 0.0, 0.0], 2.0 * np.eye(3), "rotation of a frame is not orthonormal"),
         ([0.0, 0.0, 0.0], -np.eye(3), "a reflection"),
     ],
 )

@@ -1,4 +1,4 @@
-"""`Leading`: the methods of `Bridge` that hold and touch tissue."""
+"""`Driving`: the methods of `Bridge` that attach frames, and geoms that touch tissue."""
 
 import math
 from collections.abc import Sequence
@@ -7,35 +7,31 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.coupling.led_bodies import LedBodies, LedPoses
-from bridge.coupling.led_contact import LedContact
-from bridge.coupling.led_grip import LedGrip
+from bridge.coupling.driven_bodies import DrivenBodies, DrivenContact, DrivenFrame, DrivenPoses
 from bridge.coupling.query import Query
-from bridge.input_checks import finite
-from bridge.led_frames import FrameHold, FrameLoad, FrameTie, plain_region
-from bridge.led_geoms import GeomPoses
+from bridge.driven import FrameAttachment, FrameLoad, FrameTie, GeomPoses, plain_region
 from bridge.link import TissueLink
-from bridge.poses import Pose
+from bridge.poses import Pose, finite
 from tissue import Geom, Snapshot
 
 
 class PathPart(NamedTuple):
-    """A part of the path that the tissue has not been asked for yet."""
+    """A part of the path that the tissue has not done yet."""
 
     blade: Pose
     """The blade at its end."""
     seconds: float
     """How long it takes [s]."""
-    led: LedPoses
-    """Where frames and geoms are at its end."""
+    driven: DrivenPoses
+    """Poses of the driven frames and geoms at its end."""
 
 
-class Leading:
-    """A bridge whose arm's side leads frames and geoms, beside the blade."""
+class Driving:
+    """A bridge whose arm's side drives frames and geoms besides the blade."""
 
     _link: TissueLink
     _query: Query
-    _led: LedBodies
+    _driven: DrivenBodies
     _path: list[PathPart]
 
     def attach(
@@ -46,15 +42,15 @@ class Leading:
         damping: float = 0.0,
         breaks_at: float = math.inf,
         origin: Sequence[float] | None = None,
-    ) -> LedGrip:
-        """Let a frame hold tissue, over any link; return the grip, which is moved in each step.
+    ) -> DrivenFrame:
+        """Attach a frame to tissue, over any link; return the frame, which is moved in each step.
 
         Args:
             where: A region as text, a mask of nodes, numbers of nodes, or places in the body at
                 rest [m], as for `tissue.Tissue.attach`; tissue frame.
-            stiffness: Of all springs together [N/m].
-            damping: Of all dampers together [N s/m].
-            breaks_at: Force at which it lets go [N].
+            stiffness: Total stiffness of the springs [N/m].
+            damping: Total damping of the springs [N s/m].
+            breaks_at: Force at which the frame releases the tissue [N].
             origin: Origin of the frame [m], tissue frame; None: the mean of the points.
 
         Raises:
@@ -62,11 +58,11 @@ class Leading:
             LinkError: the tissue is in another one, and refuses that or did not answer.
         """
         self._query.wait()
-        grip = self._led.attach(
-            FrameHold(plain_region(where), stiffness, damping, breaks_at, origin)
+        frame = self._driven.attach(
+            FrameAttachment(plain_region(where), stiffness, damping, breaks_at, origin)
         )
-        self._add_to_path(grip)
-        return grip
+        self._add_to_path(frame)
+        return frame
 
     def tie(
         self,
@@ -79,20 +75,21 @@ class Leading:
         damping: float = 0.0,
         rest_length: float | None = None,
         breaks_at: float = math.inf,
-    ) -> LedGrip:
-        """Tie tissue by strands that the blade can cut, over any link; return what they end at.
+    ) -> DrivenFrame:
+        """Tie tissue by strands that the blade can cut, over any link; return their frame.
 
-        That is a frame at rest, until it is moved; `n_points` is the number of strands.
+        The strands end at the frame, which rests until it is moved; `n_points` is the number of
+        strands.
 
         Args:
-            where: What `attach` takes.
+            where: Where the strands begin; as for `attach`.
             to: Where the strands end [m], tissue frame, shape (3,), or one place for each, (n, 3).
-            stiffness: Of all strands together, along them [N/m].
-            area: Cross-section of all strands together [m2].
-            toughness: Energy of cutting them [J/m2].
-            damping: Of all of them together, along them [N s/m].
+            stiffness: Total stiffness of the strands along them [N/m].
+            area: Total cross-section of the strands [m2].
+            toughness: Energy of cutting a strand [J/m2].
+            damping: Total damping of the strands along them [N s/m].
             rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
-            breaks_at: Force of all of them at which they let go [N].
+            breaks_at: Total force of the strands at which they break [N].
 
         Raises:
             ValueError: see `tissue.Tissue.tie`, where the tissue is in this process.
@@ -101,22 +98,22 @@ class Leading:
         self._query.wait()
         ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where strands end").tolist()
         of_strands = (stiffness, area, toughness, damping, rest_length, breaks_at)
-        grip = self._led.tie(FrameTie(plain_region(where), ends, *of_strands))
-        self._add_to_path(grip)
-        return grip
+        frame = self._driven.tie(FrameTie(plain_region(where), ends, *of_strands))
+        self._add_to_path(frame)
+        return frame
 
-    def release(self, held: LedGrip) -> None:
-        """Let go what a grip holds; again it does nothing.
+    def release(self, frame: DrivenFrame) -> None:
+        """Release what a frame is attached to; again it does nothing.
 
         Raises:
             ValueError: it is none of this bridge.
             LinkError: the tissue is in another process, and did not answer.
         """
         self._query.wait()
-        self._led.release(held)
+        self._driven.release(frame)
 
-    def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> LedContact:
-        """Let the tissue touch rigid geoms, over any link, and no others; return the contact.
+    def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> DrivenContact:
+        """Replace the rigid geoms that the tissue touches, over any link; return the contact.
 
         The contact is moved in each step. What the tissue's own scene had it touch, such as a
         table, must be among the geoms.
@@ -130,9 +127,11 @@ class Leading:
             LinkError: the tissue is in another one, and refuses that or did not answer.
         """
         self._query.wait()
-        contact = self._led.collide_with(geoms, poses, answer_is_due=self._query.is_pending)
+        contact = self._driven.collide_with(geoms, poses, answer_is_due=self._query.is_pending)
         at_rest = contact.poses
-        self._path = [part._replace(led=part.led._replace(geoms=at_rest)) for part in self._path]
+        self._path = [
+            part._replace(driven=part.driven._replace(geoms=at_rest)) for part in self._path
+        ]
         return contact
 
     def snapshot(self) -> Snapshot:
@@ -146,15 +145,15 @@ class Leading:
 
     @property
     def frame_loads(self) -> Sequence[FrameLoad]:
-        """What the tissue did to each frame that acts on it, in its last answer; tissue frame.
+        """Load on each frame that acts on the tissue, in its last answer; tissue frame.
 
-        First come those of the tissue's own scene, then the grips.
+        First come those of the tissue's own scene, then the driven ones.
         """
-        return self._led.loads
+        return self._driven.loads
 
-    def _add_to_path(self, grip: LedGrip) -> None:
-        """Have a frame that is new at rest in the part of the path that is yet to be done."""
+    def _add_to_path(self, frame: DrivenFrame) -> None:
+        """Add a new frame, at rest, to the part of the path that is yet to be done."""
         self._path = [
-            part._replace(led=part.led._replace(frames=(*part.led.frames, grip.pose)))
+            part._replace(driven=part.driven._replace(frames=(*part.driven.frames, frame.pose)))
             for part in self._path
         ]
