@@ -10,7 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tissue import FloatArray, Wrench
+from tissue import FloatArray, IntArray, Wrench
+
+TissueRegion = str | IntArray | FloatArray
+"""A region of tissue as text, numbers of nodes (n,), or places in the body at rest [m], (n, 3)."""
 
 
 class FramePose(NamedTuple):
@@ -34,7 +37,7 @@ class FrameLoad(NamedTuple):
 class FrameAttachment(NamedTuple):
     """Attachment of a frame to tissue: what `tissue.Tissue.attach` takes."""
 
-    where: str | list[int] | list[list[float]]
+    where: TissueRegion
     """A region as text, numbers of nodes, or places in the body at rest [m]."""
     stiffness: float
     """Total stiffness of the springs [N/m]."""
@@ -42,17 +45,17 @@ class FrameAttachment(NamedTuple):
     """Total damping of the springs [N s/m]."""
     breaks_at: float = math.inf
     """Force at which the frame releases the tissue [N]."""
-    origin: Sequence[float] | None = None
+    origin: FloatArray | None = None
     """Origin of the frame [m]; None: the mean of the points."""
 
 
 class FrameTie(NamedTuple):
     """Strands that tie tissue to a frame: what `tissue.Tissue.tie` takes."""
 
-    where: str | list[int] | list[list[float]]
+    where: TissueRegion
     """Where the strands begin; as `FrameAttachment.where`."""
-    to: list[list[float]]
-    """Where the strands end [m]: one place for all, or one for each."""
+    to: FloatArray
+    """Where the strands end [m], shape (n, 3): one place for all, or one for each."""
     stiffness: float
     """Total stiffness of the strands along them [N/m]."""
     area: float
@@ -67,7 +70,7 @@ class FrameTie(NamedTuple):
     """Total force of the strands at which they break [N]."""
 
 
-def plain_region(where: str | npt.ArrayLike) -> str | list[int] | list[list[float]]:
+def plain_region(where: str | npt.ArrayLike) -> TissueRegion:
     """Return a region as `FrameAttachment.where` takes it; a mask becomes numbers of nodes."""
     if isinstance(where, str):
         return where
@@ -75,9 +78,8 @@ def plain_region(where: str | npt.ArrayLike) -> str | list[int] | list[list[floa
     if array.dtype == np.bool_:
         array = np.flatnonzero(array)
     if array.dtype.kind in "iu":
-        return [int(node) for node in np.atleast_1d(array)]
-    rows: list[list[float]] = np.atleast_2d(array.astype(np.float64)).tolist()
-    return rows
+        return np.atleast_1d(array).astype(np.int64)
+    return np.atleast_2d(array.astype(np.float64))
 
 
 def expect_each(poses: Sequence[FramePose], n: int) -> None:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
 
 from bridge.driven import (
     NO_GEOM_LOADS,
@@ -230,18 +227,18 @@ class InProcessLink:
     def attach(self, attachment: FrameAttachment) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
         frame = self._tissue.attach(
-            _places(attachment.where),
+            attachment.where,
             stiffness=attachment.stiffness,
             damping=attachment.damping,
             breaks_at=attachment.breaks_at,
-            origin=attachment.origin,
+            origin=None if attachment.origin is None else attachment.origin.tolist(),
         )
         return self._added(frame)
 
     def tie(self, tie: FrameTie) -> int:
         """Tie the body by strands to a frame; see `TissueLink.tie`."""
         ligament = self._tissue.tie(
-            _places(tie.where),
+            tie.where,
             tie.to[0] if len(tie.to) == 1 else tie.to,
             stiffness=tie.stiffness,
             area=tie.area,
@@ -316,11 +313,6 @@ class InProcessLink:
 
     def close(self) -> None:
         """Do nothing: the tissue belongs to the caller."""
-
-
-def _places(where: str | list[int] | list[list[float]]) -> str | npt.NDArray[Any]:
-    """Return a region as the tissue takes it."""
-    return where if isinstance(where, str) else np.array(where)
 
 
 def link_to(tissue: Tissue | TissueLink) -> TissueLink:

@@ -58,8 +58,9 @@ class Driving:
             LinkError: the tissue is in another one, and refuses that or did not answer.
         """
         self._query.wait()
+        at = None if origin is None else np.asarray(origin, np.float64)
         frame = self._driven.attach(
-            FrameAttachment(plain_region(where), stiffness, damping, breaks_at, origin)
+            FrameAttachment(plain_region(where), stiffness, damping, breaks_at, at)
         )
         self._add_to_path(frame)
         return frame
@@ -96,7 +97,7 @@ class Driving:
             LinkError: the tissue is in another one, and refuses that or did not answer.
         """
         self._query.wait()
-        ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where strands end").tolist()
+        ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where strands end")
         of_strands = (stiffness, area, toughness, damping, rest_length, breaks_at)
         frame = self._driven.tie(FrameTie(plain_region(where), ends, *of_strands))
         self._add_to_path(frame)

@@ -7,17 +7,16 @@ from typing import Self
 import numpy as np
 
 from bridge.device.messages import (
-    LARGEST_DEVICE_DESCRIPTION,
-    STATE_BYTES,
+    DEVICE_DESCRIPTION,
+    SERVO,
+    STATE,
     CartesianPose,
     DeviceState,
     ServoRequest,
-    pack_servo,
-    unpack_device_description,
-    unpack_state,
 )
 from bridge.link import LinkError
 from bridge.tcp.connection import Connection, Served
+from bridge.tcp.messages.encoding import MAP_BYTES
 from bridge.tcp.wire import MessageKind
 from tissue import FloatArray
 
@@ -60,7 +59,7 @@ class DeviceClient:
         self._connection = Connection(address, _BLADE, DEVICE_ANSWER_SECONDS, key, patience)
         try:
             self.description = self._connection.request(
-                MessageKind.HELLO, b"", LARGEST_DEVICE_DESCRIPTION, unpack_device_description
+                MessageKind.HELLO, b"", MAP_BYTES, DEVICE_DESCRIPTION.unpack
             )
             """What there is to know of the run."""
         except LinkError:
@@ -95,7 +94,7 @@ class DeviceClient:
         """
         pose = CartesianPose(np.asarray(position, float), np.asarray(orientation, float))
         request = ServoRequest(time.monotonic(), self._period, pose, holds)
-        return self._state(MessageKind.SERVO, pack_servo(request))
+        return self._state(MessageKind.SERVO, SERVO.pack(request))
 
     def measured(self) -> DeviceState:
         """Return how the blade is, and send no pose.
@@ -118,4 +117,4 @@ class DeviceClient:
         self._connection.close()
 
     def _state(self, kind: MessageKind, payload: bytes = b"") -> DeviceState:
-        return self._connection.request(kind, payload, STATE_BYTES, unpack_state)
+        return self._connection.request(kind, payload, MAP_BYTES, STATE.unpack)

@@ -1,15 +1,23 @@
-"""The messages of a device: the pose that it wants, and how the blade is."""
+"""The messages of a device, by the names of CRTK: the pose that it wants, and how the blade is."""
 
 import math
-import struct
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
-import numpy as np
 
-from bridge.tcp.messages.text import WANTED_NAME, is_scene_name
+from bridge.tcp.messages.driven import WRENCH, expect_near
+from bridge.tcp.messages.encoding import FiniteFloat, Message, Record, expect_finite
+from bridge.tcp.messages.text import SentSceneName
 from bridge.tcp.wire import MessageError
-from tissue import LARGEST_COORDINATE, FloatArray, Wrench
+from tissue import FloatArray, Wrench
+
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-5, 1.0
+"""Shortest and longest period [s]. A device sends up to a thousand poses a second."""
+
+_UNIT_TOLERANCE = 1e-3
+"""Largest difference of the length of a quaternion from 1: some devices send three decimals."""
+
+_Number = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class CartesianPose(NamedTuple):
@@ -45,7 +53,7 @@ class DeviceState(NamedTuple):
     """Messages that were refused, such as a pose that is not finite."""
 
 
-class DeviceDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class DeviceDescription(NamedTuple):
     """Description of the run whose blade it drives."""
 
     scene: str
@@ -56,25 +64,6 @@ class DeviceDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     """Highest speed of the middle of the edge [m/s]."""
     most_turn_rate: float
     """Highest rate at which the blade turns [rad/s]."""
-
-
-SHORTEST_PERIOD, LONGEST_PERIOD = 1e-5, 1.0
-"""Shortest and longest period [s]. A device sends up to a thousand poses a second."""
-
-LARGEST_DEVICE_DESCRIPTION = 1 << 12
-"""Largest description [byte]: a name and three numbers."""
-
-_UNIT_TOLERANCE = 1e-3
-"""Largest difference of the length of a quaternion from 1: some devices send three decimals."""
-
-_SERVO = struct.Struct("<9dI")
-
-_STATE = struct.Struct("<15d3q2I")
-
-STATE_BYTES = _STATE.size
-"""Length of the reply with the state [byte]."""
-
-_description_decoder = msgspec.json.Decoder(DeviceDescription)
 
 
 class ServoRequest(NamedTuple):
@@ -90,100 +79,64 @@ class ServoRequest(NamedTuple):
     """Whether the device drives the blade."""
 
 
-def pack_servo(request: ServoRequest) -> bytes:
-    """Return the request."""
-    position, orientation = (part.tolist() for part in request.servo_cp)
-    return _SERVO.pack(request.stamp, request.period, *position, *orientation, int(request.holds))
-
-
 def unpack_servo(payload: bytes) -> ServoRequest:
     """Return the content of a request; the quaternion's length is then 1.
 
     Raises:
         MessageError: a number is missing, not finite, or out of range.
     """
-    if len(payload) != _SERVO.size:
-        raise MessageError(f"a pose of {len(payload)} bytes; wanted {_SERVO.size}")
-    stamp, period, *numbers, holds = _SERVO.unpack(payload)
-    if not (math.isfinite(stamp) and SHORTEST_PERIOD <= period <= LONGEST_PERIOD):
-        raise MessageError(
-            f"a stamp of {stamp} s and a period of {period} s; wanted a finite stamp, and a period "
-            f"from {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
-        )
-    # The comparisons are false for NaN.
-    if not all(-LARGEST_COORDINATE <= x <= LARGEST_COORDINATE for x in numbers[:3]):
-        raise MessageError(f"the pose is not within {LARGEST_COORDINATE:g} m: {numbers[:3]}")
-    length = math.hypot(*numbers[3:])
-    if not abs(length - 1.0) <= _UNIT_TOLERANCE:
-        raise MessageError(f"the orientation is no unit quaternion: {numbers[3:]}")
-    if holds not in (0, 1):
-        raise MessageError(f"a pose with {holds} for whether the device leads; wanted 0 or 1")
-    pose = CartesianPose(np.array(numbers[:3]), np.array(numbers[3:]) / length)
-    return ServoRequest(stamp, period, pose, bool(holds))
+    request = SERVO.unpack(payload)
+    position, orientation = request.servo_cp
+    length = math.hypot(*orientation.tolist())
+    return request._replace(servo_cp=CartesianPose(position, orientation / length))
 
 
-def pack_state(state: DeviceState) -> bytes:
-    """Return the reply with the state."""
-    return _STATE.pack(
-        state.time,
-        state.real_time_factor,
-        *state.measured_cp.position.tolist(),
-        *state.measured_cp.orientation.tolist(),
-        *state.measured_cf.force.tolist(),
-        *state.measured_cf.torque.tolist(),
-        state.n_limited,
-        state.n_missed,
-        state.n_dropped,
-        int(state.is_engaged),
-        int(state.has_ended),
-    )
+def _check_servo(request: ServoRequest) -> None:
+    position, orientation = request.servo_cp
+    expect_near(position, "the pose")
+    # The comparison is false for NaN.
+    if not abs(math.hypot(*orientation.tolist()) - 1.0) <= _UNIT_TOLERANCE:
+        raise MessageError(f"the orientation is no unit quaternion: {orientation.tolist()}")
 
 
-def unpack_state(payload: bytes) -> DeviceState:
-    """Return the content of a reply with the state.
-
-    Raises:
-        MessageError: a number is missing or not finite: no device may render such a force.
-    """
-    if len(payload) != _STATE.size:
-        raise MessageError(f"a state of {len(payload)} bytes; wanted {_STATE.size}")
-    found = _STATE.unpack(payload)
-    numbers = np.array(found[:15])
-    if not np.isfinite(numbers).all():
-        raise MessageError(f"the state of the blade is not finite: {numbers.tolist()}")
-    position = numbers[2:5]
-    limited, missed, dropped, is_engaged, has_ended = found[15:]
-    return DeviceState(
-        float(numbers[0]),
-        float(numbers[1]),
-        CartesianPose(position, numbers[5:9]),
-        Wrench(numbers[9:12], numbers[12:15], position),
-        bool(is_engaged),
-        bool(has_ended),
-        limited,
-        missed,
-        dropped,
-    )
+def _check_state(state: DeviceState) -> None:
+    """Refuse a state that is not finite: no device may render such a force."""
+    expect_finite(*state.measured_cp, *state.measured_cf)
 
 
-def pack_device_description(description: DeviceDescription) -> bytes:
-    """Return the reply to a HELLO."""
-    return msgspec.json.encode(description)
+_POSE = Record(CartesianPose, position=(3,), orientation=(4,))
 
+SERVO: Message[ServoRequest] = Message(
+    Record(
+        ServoRequest,
+        stamp=FiniteFloat,
+        period=Annotated[float, msgspec.Meta(ge=SHORTEST_PERIOD, le=LONGEST_PERIOD)],
+        servo_cp=_POSE,
+    ),
+    "the pose",
+    _check_servo,
+)
+"""The request with the pose that a device wants."""
 
-def unpack_device_description(payload: bytes) -> DeviceDescription:
-    """Return the description in the reply to a HELLO.
+STATE: Message[DeviceState] = Message(
+    Record(
+        DeviceState,
+        time=FiniteFloat,
+        real_time_factor=FiniteFloat,
+        measured_cp=_POSE,
+        measured_cf=WRENCH,
+        n_limited=_Number,
+        n_missed=_Number,
+        n_dropped=_Number,
+    ),
+    "the state of the blade",
+    _check_state,
+)
+"""The reply with the state of the blade."""
 
-    Raises:
-        MessageError: the other side is no run that a device drives, or its scene has no valid name.
-    """
-    try:
-        found = _description_decoder.decode(payload)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise MessageError(
-            "it is no run that a device drives; start one there with: scalpel-sim run --hand "
-            f"device ({error})"
-        ) from error
-    if not is_scene_name(found.scene):
-        raise MessageError(f"the run's scene is {found.scene[:80]!r}; wanted {WANTED_NAME}")
-    return found
+DEVICE_DESCRIPTION: Message[DeviceDescription] = Message(
+    Record(DeviceDescription, scene=SentSceneName),
+    "it is no run that a device drives; start one there with: scalpel-sim run --hand device. Its "
+    "description",
+)
+"""The reply to a HELLO."""

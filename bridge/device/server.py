@@ -4,15 +4,13 @@ import logging
 import time
 from typing import Protocol
 
-from msgspec import structs
-
 from bridge.device.messages import (
+    DEVICE_DESCRIPTION,
+    STATE,
     CartesianPose,
     DeviceDescription,
     DeviceState,
     ServoRequest,
-    pack_device_description,
-    pack_state,
     unpack_servo,
 )
 from bridge.tcp.address import DEFAULT_HOST
@@ -88,7 +86,7 @@ class DeviceServer(SingleClientServer):
     ) -> None:
         super().__init__("the blade", host, port, key)
         self._driven = driven
-        self._description = structs.replace(description, scene=sent_scene_name(description.scene))
+        self._description = description._replace(scene=sent_scene_name(description.scene))
         self._stamp: float | None = None
         self._is_refusing = False
         self._n_missed = self._n_dropped = 0
@@ -122,12 +120,12 @@ class DeviceServer(SingleClientServer):
         elif frame.payload:
             raise MessageError(f"a request of kind {frame.kind} carries {len(frame.payload)} bytes")
         elif frame.kind == MessageKind.HELLO:
-            return pack_device_description(self._description)
+            return DEVICE_DESCRIPTION.pack(self._description)
         elif frame.kind == MessageKind.END:
             self._driven.end()
         elif frame.kind != MessageKind.MEASURED:
             raise MessageError(f"there is no request of kind {frame.kind} where a device drives")
-        return pack_state(self.state())
+        return STATE.pack(self.state())
 
     def _servo(self, request: ServoRequest) -> None:
         """Drive the blade, and count the periods since the last pose in which none was sent.

@@ -18,29 +18,31 @@ from bridge.driven import (
 from bridge.link import TissueDescription
 from bridge.tcp.connection import ANSWER_SECONDS, Connection, Served
 from bridge.tcp.messages.body import (
-    PIECES_BYTES,
+    CHUNKS,
+    CUT_REPORT,
+    LARGEST_CHUNKS,
+    PIECES,
+    QUANTITY,
+    SNAPSHOT,
+    SURFACE,
+    VALUES,
     snapshot_bytes,
     surface_bytes,
-    unpack_pieces,
-    unpack_snapshot,
-    unpack_surface,
+    values_bytes,
 )
-from bridge.tcp.messages.chunks import LARGEST_CHUNKS, unpack_chunks
-from bridge.tcp.messages.cut_report import CUT_REPORT_BYTES, unpack_cut_report
-from bridge.tcp.messages.geoms import pack_geoms
-from bridge.tcp.messages.led_frames import (
+from bridge.tcp.messages.driven import (
+    ATTACHMENT,
+    LARGEST_LOADS,
+    LOAD,
     LOAD_BYTES,
-    MAX_FRAMES,
-    pack_attachment,
-    pack_number,
-    pack_tie,
-    unpack_all_loads,
-    unpack_loads,
+    LOADS,
+    NUMBER,
+    TIE,
+    pack_geoms,
 )
-from bridge.tcp.messages.result import LARGEST_RESULT, unpack_result
-from bridge.tcp.messages.step import pack_step
-from bridge.tcp.messages.text import LARGEST_DESCRIPTION, unpack_description
-from bridge.tcp.messages.values import pack_quantity, unpack_values, values_bytes
+from bridge.tcp.messages.encoding import MAP_BYTES
+from bridge.tcp.messages.step import LARGEST_RESULT, StepReply, pack_step, unpack_result
+from bridge.tcp.messages.text import DESCRIPTION, LARGEST_DESCRIPTION
 from bridge.tcp.wire import MessageError, MessageKind
 from tissue import (
     BladeSweep,
@@ -105,7 +107,7 @@ class TcpLink:
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
         description = self._connection.request(
-            MessageKind.HELLO, b"", LARGEST_DESCRIPTION, unpack_description
+            MessageKind.HELLO, b"", LARGEST_DESCRIPTION, DESCRIPTION.unpack
         )
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
         return description
@@ -136,16 +138,16 @@ class TcpLink:
 
     def attach(self, attachment: FrameAttachment) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
-        return self._added(MessageKind.ATTACH, pack_attachment(attachment))
+        return self._added(MessageKind.ATTACH, ATTACHMENT.pack(attachment))
 
     def tie(self, tie: FrameTie) -> int:
         """Tie the body by strands to a frame; see `TissueLink.tie`."""
-        return self._added(MessageKind.TIE, pack_tie(tie))
+        return self._added(MessageKind.TIE, TIE.pack(tie))
 
     def _added(self, kind: MessageKind, request: bytes) -> int:
         """Ask for a frame, and return its number."""
         before = self.loads()
-        reply = self._connection.request(kind, request, LOAD_BYTES, _one_load)
+        reply = self._connection.request(kind, request, LOAD_BYTES, LOAD.unpack)
         self._loads = [*before, reply]
         self._n_led += 1
         return len(before)
@@ -154,15 +156,16 @@ class TcpLink:
         """Release the frame of that number."""
         loads = [*self.loads()]
         loads[number] = self._connection.request(
-            MessageKind.RELEASE, pack_number(number), LOAD_BYTES, _one_load
+            MessageKind.RELEASE, NUMBER.pack(number), LOAD_BYTES, LOAD.unpack
         )
         self._loads = loads
 
     def loads(self) -> Sequence[FrameLoad]:
         """Return what the body did to each frame in the last step."""
         if self._loads is None:
-            limit = LOAD_BYTES * MAX_FRAMES
-            self._loads = self._connection.request(MessageKind.FRAMES, b"", limit, unpack_all_loads)
+            self._loads = self._connection.request(
+                MessageKind.FRAMES, b"", LARGEST_LOADS, LOADS.unpack
+            )
         return self._loads
 
     def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
@@ -178,56 +181,48 @@ class TcpLink:
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
         limit = snapshot_bytes(self._n_nodes, self._n_tetrahedra)
-        return self._connection.request(MessageKind.SNAPSHOT, b"", limit, unpack_snapshot)
+        return self._connection.request(MessageKind.SNAPSHOT, b"", limit, SNAPSHOT.unpack)
 
     def chunks(self) -> Chunks:
         """Return boxes that together hold the body, and the speed of its fastest node."""
-        return self._connection.request(MessageKind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
+        return self._connection.request(MessageKind.CHUNKS, b"", LARGEST_CHUNKS, CHUNKS.unpack)
 
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
         limit = surface_bytes(self._n_tetrahedra)
-        return self._connection.request(MessageKind.SURFACE, b"", limit, unpack_surface)
+        return self._connection.request(MessageKind.SURFACE, b"", limit, SURFACE.unpack)
 
     def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
         """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
-        limit, request = values_bytes(self._n_nodes), pack_quantity(quantity)
-        return self._connection.request(MessageKind.VALUES, request, limit, unpack_values)
+        limit, request = values_bytes(self._n_nodes), QUANTITY.pack(quantity)
+        return self._connection.request(MessageKind.VALUES, request, limit, VALUES.unpack)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
-        return self._connection.request(MessageKind.PIECES, b"", PIECES_BYTES, unpack_pieces)
+        return self._connection.request(MessageKind.PIECES, b"", MAP_BYTES, PIECES.unpack)
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
-        return self._connection.request(
-            MessageKind.QUALITY, b"", CUT_REPORT_BYTES, unpack_cut_report
-        )
+        return self._connection.request(MessageKind.QUALITY, b"", MAP_BYTES, CUT_REPORT.unpack)
 
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
 
 
-def _checked_result(
-    before: Sequence[FrameLoad] | None, n_geoms: int, payload: bytes
-) -> tuple[StepResult, list[FrameLoad], GeomLoads]:
+def _checked_result(before: Sequence[FrameLoad] | None, n_geoms: int, payload: bytes) -> StepReply:
     """Return the content of the reply to a step.
 
     Raises:
         MessageError: see `unpack_result`; or there are other frames than before.
     """
-    found = unpack_result(payload, n_geoms)
-    n = len(found[1])
+    reply = unpack_result(payload, n_geoms)
+    n = len(reply.loads)
     if before is not None and n != len(before):
         raise MessageError(f"a step reply with the loads on {n} frames; there are {len(before)}")
-    return found
+    return reply
 
 
 def _nothing(payload: bytes) -> None:
     if payload:
         raise MessageError(f"a reply of {len(payload)} bytes; wanted none")
-
-
-def _one_load(payload: bytes) -> FrameLoad:
-    return unpack_loads(payload, 1)[0]

@@ -14,21 +14,26 @@ from typing import TYPE_CHECKING
 
 from bridge.link import InProcessLink, SceneView
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
-from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
-from bridge.tcp.messages.chunks import pack_chunks
-from bridge.tcp.messages.cut_report import pack_cut_report
-from bridge.tcp.messages.geoms import unpack_geoms
-from bridge.tcp.messages.led_frames import (
-    MAX_FRAMES,
-    pack_loads,
-    unpack_attachment,
-    unpack_number,
-    unpack_tie,
+from bridge.tcp.messages.body import (
+    CHUNKS,
+    CUT_REPORT,
+    PIECES,
+    QUANTITY,
+    SNAPSHOT,
+    SURFACE,
+    VALUES,
 )
-from bridge.tcp.messages.result import pack_result
-from bridge.tcp.messages.step import unpack_step
-from bridge.tcp.messages.text import MAX_VIEWS, pack_description, sent_scene_name
-from bridge.tcp.messages.values import pack_values, unpack_quantity
+from bridge.tcp.messages.driven import (
+    ATTACHMENT,
+    LOAD,
+    LOADS,
+    MAX_FRAMES,
+    TIE,
+    unpack_geoms,
+    unpack_number,
+)
+from bridge.tcp.messages.step import RESULT, StepReply, unpack_step
+from bridge.tcp.messages.text import DESCRIPTION, MAX_VIEWS, sent_scene_name
 from bridge.tcp.request_limits import RequestLimits
 from bridge.tcp.single_client import SingleClientServer
 from bridge.tcp.wire import Frame, MessageError, MessageKind
@@ -37,6 +42,17 @@ if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
     from tissue import Tissue
 
 _logger = logging.getLogger(__name__)
+
+_QUERIES: dict[int, Callable[[InProcessLink], bytes]] = {
+    MessageKind.HELLO: lambda link: DESCRIPTION.pack(link.describe()),
+    MessageKind.SNAPSHOT: lambda link: SNAPSHOT.pack(link.snapshot()),
+    MessageKind.SURFACE: lambda link: SURFACE.pack(link.surface()),
+    MessageKind.FRAMES: lambda link: LOADS.pack(link.loads()),
+    MessageKind.CHUNKS: lambda link: CHUNKS.pack(link.chunks()),
+    MessageKind.PIECES: lambda link: PIECES.pack(link.n_pieces()),
+    MessageKind.QUALITY: lambda link: CUT_REPORT.pack(link.cut_report()),
+}
+"""The requests without a content, and the contents of their replies."""
 
 
 def serve(
@@ -109,6 +125,20 @@ class TissueServer(SingleClientServer):
                 f"the scene has {len(views)} views; a client takes {MAX_VIEWS} at most"
             )
         self._make_tissue = make_tissue
+        self._requests: dict[int, Callable[[bytes], bytes]] = {
+            MessageKind.STEP: self._step,
+            MessageKind.ATTACH: lambda payload: self._add(
+                partial(self._link.attach, ATTACHMENT.unpack(payload))
+            ),
+            MessageKind.TIE: lambda payload: self._add(
+                partial(self._link.tie, TIE.unpack(payload))
+            ),
+            MessageKind.COLLIDE: self._collide,
+            MessageKind.RELEASE: self._release,
+            MessageKind.VALUES: lambda payload: VALUES.pack(
+                self._link.surface_values(QUANTITY.unpack(payload))
+            ),
+        }
         self._scene, self._views = sent_scene_name(scene), tuple(views)
         super().__init__("the tissue", host, port, key)
         try:
@@ -133,37 +163,14 @@ class TissueServer(SingleClientServer):
         Raises:
             MessageError: the request is malformed or of an unknown kind.
         """
-        if frame.kind == MessageKind.STEP:
-            return self._step(frame.payload)
-        if frame.kind == MessageKind.ATTACH:
-            return self._add(partial(self._link.attach, unpack_attachment(frame.payload)))
-        if frame.kind == MessageKind.TIE:
-            return self._add(partial(self._link.tie, unpack_tie(frame.payload)))
-        if frame.kind == MessageKind.COLLIDE:
-            return self._collide(frame.payload)
-        if frame.kind == MessageKind.RELEASE:
-            number = unpack_number(frame.payload, len(self._link.loads()))
-            self._link.release(number)
-            return pack_loads([self._link.loads()[number]])
-        if frame.kind == MessageKind.VALUES:
-            return pack_values(self._link.surface_values(unpack_quantity(frame.payload)))
-        if frame.payload:
-            raise MessageError(f"a request of kind {frame.kind} carries {len(frame.payload)} bytes")
-        if frame.kind == MessageKind.HELLO:
-            return pack_description(self._link.describe())
-        if frame.kind == MessageKind.SNAPSHOT:
-            return pack_snapshot(self._link.snapshot())
-        if frame.kind == MessageKind.SURFACE:
-            return pack_surface(self._link.surface())
-        if frame.kind == MessageKind.FRAMES:
-            return pack_loads(self._link.loads())
-        if frame.kind == MessageKind.CHUNKS:
-            return pack_chunks(self._link.chunks())
-        if frame.kind == MessageKind.PIECES:
-            return pack_pieces(self._link.n_pieces())
-        if frame.kind == MessageKind.QUALITY:
-            return pack_cut_report(self._link.cut_report())
-        raise MessageError(f"there is no request of kind {frame.kind}")
+        payload = frame.payload
+        if frame.kind in self._requests:
+            return self._requests[frame.kind](payload)
+        if payload:
+            raise MessageError(f"a request of kind {frame.kind} carries {len(payload)} bytes")
+        if frame.kind not in _QUERIES:
+            raise MessageError(f"there is no request of kind {frame.kind}")
+        return _QUERIES[frame.kind](self._link)
 
     def _step(self, payload: bytes) -> bytes:
         """Do a step, and return its result.
@@ -179,7 +186,7 @@ class TissueServer(SingleClientServer):
             self._limits.check_poses(poses, link.loads()[-link.n_driven :])
         with _refusals():
             result = link.step(sweep, dt, poses, geoms)
-        return pack_result(result, link.loads(), link.geom_loads())
+        return RESULT.pack(StepReply(result, link.loads(), link.geom_loads()))
 
     def _add(self, add: Callable[[], int]) -> bytes:
         """Add a driven frame, and return the load on it.
@@ -191,7 +198,17 @@ class TissueServer(SingleClientServer):
             raise MessageError(f"there are {MAX_FRAMES} frames, and there may be no more")
         with _refusals():
             number = add()
-        return pack_loads(self._link.loads()[number:])
+        return LOAD.pack(self._link.loads()[number])
+
+    def _release(self, payload: bytes) -> bytes:
+        """Release a frame, and return the load on it.
+
+        Raises:
+            MessageError: there is no such frame.
+        """
+        number = unpack_number(payload, len(self._link.loads()))
+        self._link.release(number)
+        return LOAD.pack(self._link.loads()[number])
 
     def _collide(self, payload: bytes) -> bytes:
         """Replace the geoms that the tissue touches, and return an empty reply.

@@ -17,14 +17,15 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-PROTOCOL_VERSION = 8
+PROTOCOL_VERSION = 9
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
 contacts and energies of a step; 6 added driven frames; 7 added driven geoms
-and ties; 8 added values at the surface."""
+and ties; 8 added values at the surface; 9 made contents
+MessagePack."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be kept before it can be checked. A step request
-has 152 bytes, and 96 for each driven frame and geom; a whole body comes in parts."""
+has some 200 bytes, and 96 for each driven frame and geom; a whole body comes in parts."""
 LARGEST_REPLY = 1 << 30
 """Largest reply, all parts [byte]. A snapshot of ten million tetrahedra is half of it. The limit of
 a single reply follows from the mesh: see `snapshot_bytes` and `surface_bytes` in

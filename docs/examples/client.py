@@ -1,11 +1,12 @@
-"""Cuts a tissue that `scalpel-sim serve` holds; no package needed: python client.py [PORT]."""
+"""Cuts a tissue that `scalpel-sim serve` holds: pip install msgpack, python client.py [PORT]."""
 
-import json
 import socket
 import struct
 import sys
 import time
 import zlib
+
+import msgpack
 
 HELLO, STEP, ERROR = 1, 2, 6
 
@@ -23,26 +24,27 @@ def connected(port):
 
 
 def ask(sequence, kind, payload=b""):
-    """Return the payload of the reply to a request."""
-    head = struct.pack("<4sHHIII", b"SCUT", 8, kind, sequence, len(payload), zlib.crc32(payload))
+    """Return the content of the reply to a request."""
+    head = struct.pack("<4sHHIII", b"SCUT", 9, kind, sequence, len(payload), zlib.crc32(payload))
     connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
     head = connection.recv(24, socket.MSG_WAITALL) or sys.exit("the server has gone")
     _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)
     reply = connection.recv(length, socket.MSG_WAITALL) if length else b""
     if answer == ERROR or zlib.crc32(reply) != checksum:
         sys.exit(reply.decode(errors="replace"))
-    return reply
+    return msgpack.unpackb(reply)
 
 
 connection = connected(int([*sys.argv, "8766"][1]))
 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-(x0, y0, z0), (x1, y1, z1) = json.loads(ask(0, HELLO))["bounds"]
+x0, y0, z0, x1, y1, z1 = struct.unpack("<6d", ask(0, HELLO)["bounds"])
 x, y, bottom, forward = (x0 + x1) / 2, y0 - 2e-3, z0 - 5e-3, (0.0, 1.0, 0.0)  # upright
 pose = (x, y, bottom, x, y, z1 + 5e-3, *forward)
 for frame in range(1, 1001):  # 1 ms each, at 60 mm/s along y
     before, y = pose, y + 60e-6
     pose = (x, y, bottom, x, y, z1 + 5e-3, *forward)
-    result = ask(frame, STEP, struct.pack("<19d", 1e-3, *before, *pose))
-    force, area = struct.unpack_from("<3d", result, 152), struct.unpack_from("<d", result, 80)[0]
+    step = {"dt": 1e-3, "blade": struct.pack("<18d", *before, *pose)}
+    result = ask(frame, STEP, msgpack.packb(step))["result"]
+    force, area = struct.unpack("<3d", result["wrench"]["force"]), result["cut_area"]
     if frame % 100 == 0:
         print(f"{frame} ms: {force[1]:+.3f} N along y, {area * 1e6:.0f} mm2 cut")

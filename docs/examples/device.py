@@ -1,10 +1,12 @@
-"""Leads a blade of `scalpel-sim run --hand device`; no package needed: python device.py [PORT]."""
+"""Drives the blade of `scalpel-sim run --hand device`; needs msgpack: python device.py [PORT]."""
 
 import socket
 import struct
 import sys
 import time
 import zlib
+
+import msgpack
 
 HELLO, ERROR, SERVO, MEASURED, END = 1, 6, 16, 17, 18
 PERIOD, SPEED, SECONDS = 1e-3, 0.02, 3.0  # s, m/s, s
@@ -23,29 +25,33 @@ def connected(port):
 
 
 def ask(sequence, kind, payload=b""):
-    """Return the payload of the reply to a request."""
-    head = struct.pack("<4sHHIII", b"SCUT", 8, kind, sequence, len(payload), zlib.crc32(payload))
+    """Return the content of the reply to a request."""
+    head = struct.pack("<4sHHIII", b"SCUT", 9, kind, sequence, len(payload), zlib.crc32(payload))
     connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
     head = connection.recv(24, socket.MSG_WAITALL) or sys.exit("the run has gone")
     _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)
     reply = connection.recv(length, socket.MSG_WAITALL)
     if answer == ERROR or zlib.crc32(reply) != checksum:
         sys.exit(reply.decode(errors="replace"))
-    return struct.unpack("<15d3q2I", reply) if kind != HELLO else reply.decode()
+    return msgpack.unpackb(reply)
 
 
 connection = connected(int([*sys.argv, "8767"][1]))
 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 print(ask(0, HELLO))
-x, y, z, *turned = ask(1, MEASURED)[2:9]  # measured_cp
+pose = ask(1, MEASURED)["measured_cp"]
+x, y, z = struct.unpack("<3d", pose["position"])
 start = time.monotonic()
 for k in range(round(SECONDS / PERIOD)):
     now = time.monotonic() - start
-    wanted = (x, y + SPEED * min(now, SECONDS), z, *turned)  # servo_cp: read your device here
-    state = ask(2 + k, SERVO, struct.pack("<9dI", now, PERIOD, *wanted, 1))
-    force = state[9:12]  # measured_cf: exert it here
+    pose["position"] = struct.pack("<3d", x, y + SPEED * min(now, SECONDS), z)  # read yours here
+    servo = {"stamp": now, "period": PERIOD, "servo_cp": pose, "holds": True}
+    state = ask(2 + k, SERVO, msgpack.packb(servo))
+    force = struct.unpack("<3d", state["measured_cf"]["force"])  # exert it here
     if k % 300 == 0:
-        print(f"{state[0]:.3f} s: tip at y {1e3 * state[3]:+.1f} mm, {force[1]:+.3f} N along y")
+        tip = struct.unpack("<3d", state["measured_cp"]["position"])
+        print(f"{state['time']:.3f} s: tip at y {1e3 * tip[1]:+.1f} mm, {force[1]:+.3f} N along y")
     time.sleep(max(0.0, start + (k + 1) * PERIOD - time.monotonic()))
-limited, missed, dropped = ask(2 + k + 1, END)[15:18]
-print(f"frames limited {limited}, periods missed {missed}, messages dropped {dropped}")
+end = ask(2 + k + 1, END)
+print(f"frames limited {end['n_limited']}, periods missed {end['n_missed']}, ", end="")
+print(f"messages dropped {end['n_dropped']}")

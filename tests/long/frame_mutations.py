@@ -4,23 +4,26 @@ Every byte goes through a TCP socket of this machine. Servers and clients take t
 a client sends, then the server serves what has come.
 """
 
-import itertools
-import json
+import copy
 import logging
 import socket
 import struct
 import time
 from functools import cache
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from bridge import DeviceDescription, DeviceServer
-from bridge.device.messages import CartesianPose, ServoRequest, pack_servo, unpack_state
+from bridge.device.messages import SERVO, CartesianPose, ServoRequest
+from bridge.device.messages import STATE as DEVICE_STATE
+from bridge.driven import FrameAttachment, FramePose, FrameTie, GeomPoses
 from bridge.link import InProcessLink
 from bridge.tcp.address import parse_address
 from bridge.tcp.channel import Channel, direction_keys, new_nonce
-from bridge.tcp.messages.result import unpack_result
-from bridge.tcp.messages.step import pack_step
+from bridge.tcp.messages.driven import ATTACHMENT, TIE, pack_geoms
+from bridge.tcp.messages.step import pack_step, unpack_result
 from bridge.tcp.messages.text import unpack_error
 from bridge.tcp.server import TissueServer
 from bridge.tcp.single_client import SingleClientServer
@@ -29,7 +32,7 @@ from tests.bridge.bits import bits
 from tests.bridge.device.served_blade import STATE
 from tests.bridge.tcp.serve_block import block_tissue
 from tests.long.child import HANG
-from tissue import BladeSegment, BladeSweep
+from tissue import BladeSegment, BladeSweep, Geom
 
 KEY = bytes(range(32))
 DT = 1e-3
@@ -47,11 +50,11 @@ RAW = (
 )
 """What a number of a payload is replaced by."""
 
-TEXTS = (
-    *("NaN", "Infinity", "-1", "0", "1e308", "1e-300", "4e9", "null", "true", '""', "[]", "{}"),
-    *('"top"', '"none"', "[0]", "[-1]", "[4000000000]", "[[0,0,0]]", "1e999", "0.001", "[[[]]]"),
+VALUES = (
+    *(np.nan, np.inf, -np.inf, -1, 0, 1, 1e308, 1e-300, 4e9, 0.001, 4_000_000_000, 2**64 - 1),
+    *(None, True, "", "top", "none", [], {}, [0], [[[]]], {"a": {}}, b"", bytes(8), bytes(24)),
 )
-"""What a value of a JSON text is replaced by."""
+"""What a field of a message is replaced by."""
 
 
 def converse(case: int) -> list[bool]:
@@ -142,12 +145,16 @@ def server_of(kind: str) -> SingleClientServer:
 def reference() -> tuple[list[bytes], list[object]]:
     """Return the requests of an honest cut, and its results as bits."""
     link, requests, results = InProcessLink(block_tissue()), [], []
-    ys = -0.002 + 0.05 * DT * np.arange(N_HONEST_STEPS + 1)
-    for before, after in itertools.pairwise(ys):
-        sweep = BladeSweep(_upright(before), _upright(after))
+    for i in range(N_HONEST_STEPS):
+        sweep = _sweep(i)
         requests.append(pack_step(sweep, DT))
         results.append(_outcome(link.step(sweep, DT)))
     return requests, results
+
+
+def _sweep(i: int) -> BladeSweep:
+    """Return the motion of the blade in a step of the honest cut."""
+    return BladeSweep(*(_upright(-0.002 + 0.05 * DT * n) for n in (i, i + 1)))
 
 
 def _upright(y: float) -> BladeSegment:
@@ -179,7 +186,7 @@ class HonestClient:
         (frame,) = self._talker.ask(MessageKind.STEP, requests[self._n])
         assert frame.kind == MessageKind.STEP, frame
         self._n += 1
-        return _outcome(unpack_result(frame.payload)[0]) == results[self._n - 1]
+        return _outcome(unpack_result(frame.payload).result) == results[self._n - 1]
 
     def close(self) -> None:
         if self._talker is not None:
@@ -254,46 +261,39 @@ def _new_client(random: np.random.Generator) -> Talker:
     (hello,) = client.ask(MessageKind.HELLO)
     assert hello.kind == MessageKind.HELLO, unpack_error(hello.payload)
     client.n_frames = client.n_geoms = 0
-    for kind, content in (
-        (MessageKind.ATTACH, _ATTACH),
-        (MessageKind.TIE, _TIE),
-        (MessageKind.COLLIDE, _COLLIDE),
-    ):
+    for kind, content in _ADDITIONS.items():
         if random.random() < 0.3:
-            (reply,) = client.ask(kind, json.dumps(content).encode())
+            (reply,) = client.ask(kind, content)
             assert reply.kind == kind, unpack_error(reply.payload)
             client.n_frames += kind != MessageKind.COLLIDE
             client.n_geoms += kind == MessageKind.COLLIDE
     return client
 
 
-_ATTACH = {"region": "top", "stiffness": 500.0, "damping": 5.0, "breaks_at": 2.0}
-_TIE = {
-    **{"points": [[0.01, 0.01, 0.02]], "to": [[0.01, 0.01, 0.05]]},
-    **{"stiffness": 200.0, "area": 2e-6, "toughness": 200.0},
+_JAW = Geom("jaw", "box", (0.01, 0.002, 0.005), 0.6)
+_PLACE_OF_JAW = GeomPoses(np.array([[0.02, 0.03, 0.05]]), np.eye(3)[None])
+_NOTHING = GeomPoses(np.zeros((0, 3)), np.zeros((0, 3, 3)))
+_POSE = FramePose(np.array([0.01, 0.01, 0.02]), np.eye(3))
+_ADDITIONS = {
+    MessageKind.ATTACH: ATTACHMENT.pack(FrameAttachment("top", 500.0, 5.0, 2.0)),
+    MessageKind.TIE: TIE.pack(
+        FrameTie(np.array([[0.01, 0.01, 0.02]]), np.array([[0.01, 0.01, 0.05]]), 200.0, 2e-6, 200.0)
+    ),
+    MessageKind.COLLIDE: pack_geoms([_JAW], _PLACE_OF_JAW),
 }
-_JAW = {"name": "jaw", "shape": "box", "size": [0.01, 0.002, 0.005], "friction": 0.6}
-_PLACE = {"origin": [0.02, 0.03, 0.05], "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
-_COLLIDE = {"geoms": [{**_JAW, **_PLACE}]}
-_POSE = struct.pack("<12d", 0.01, 0.01, 0.02, 1, 0, 0, 0, 1, 0, 0, 0, 1)
-_PLACE_OF_JAW = struct.pack("<12d", 0.02, 0.03, 0.05, 1, 0, 0, 0, 1, 0, 0, 0, 1)
 
 
 def _damaged_request(client: Talker, random: np.random.Generator) -> tuple[int, bytes]:
     """Return kind and payload of a request that is wrong in places; its checksums are right."""
     choice = random.random()
     if choice < 0.5:
-        step = reference()[0][random.integers(N_HONEST_STEPS)]
-        step = step if random.random() < 0.8 else step[:8]
-        step += client.n_frames * _POSE + client.n_geoms * _PLACE_OF_JAW
-        return MessageKind.STEP, _damaged_numbers(step, random)
+        sweep = _sweep(random.integers(N_HONEST_STEPS)) if random.random() < 0.8 else None
+        jaw = _PLACE_OF_JAW if client.n_geoms else _NOTHING
+        step = pack_step(sweep, DT, client.n_frames * [_POSE], jaw)
+        return MessageKind.STEP, _damaged_content(step, random)
     if choice < 0.8:
-        kind, content = [
-            (MessageKind.ATTACH, _ATTACH),
-            (MessageKind.TIE, _TIE),
-            (MessageKind.COLLIDE, _COLLIDE),
-        ][random.integers(3)]
-        return kind, _damaged_text(content, random)
+        kind = list(_ADDITIONS)[random.integers(3)]
+        return kind, _damaged_content(_ADDITIONS[kind], random)
     if choice < 0.9:
         kind = int(random.choice([*MessageKind, 0, 19, 99, 0x7FFF, 0xFFFF]))
         return kind | (MORE if random.random() < 0.1 else 0), b""
@@ -332,10 +332,10 @@ def _as_device(random: np.random.Generator) -> list[bool]:
             device.close()
             device = Talker(server)
             device.ask(MessageKind.HELLO)
-        good = pack_servo(ServoRequest(1e-3 * i, 1e-3, at, True))
+        good = SERVO.pack(ServoRequest(1e-3 * i, 1e-3, at, True))
         choice = random.random()
         if choice < 0.7:
-            frames = device.ask(MessageKind.SERVO, _damaged_numbers(good, random))
+            frames = device.ask(MessageKind.SERVO, _damaged_content(good, random))
         elif choice < 0.9:
             device.send(damaged_bytes(pack_frame(MessageKind.SERVO, device.sequence, good), random))
             device.sequence += 1
@@ -344,7 +344,7 @@ def _as_device(random: np.random.Generator) -> list[bool]:
             frames = device.ask(int(random.integers(0, 1 << 16)), random.bytes(8))
         for frame in frames:
             if frame.kind == MessageKind.SERVO:
-                assert unpack_state(frame.payload).time == STATE.time
+                assert DEVICE_STATE.unpack(frame.payload).time == STATE.time
             elif frame.kind == MessageKind.ERROR:
                 assert unpack_error(frame.payload)
     device.close()
@@ -353,7 +353,7 @@ def _as_device(random: np.random.Generator) -> list[bool]:
     (reply,) = honest.ask(MessageKind.SERVO, good)
     assert reply.kind == MessageKind.SERVO
     honest.close()
-    place = unpack_state(reply.payload).measured_cp.position.tolist()
+    place = DEVICE_STATE.unpack(reply.payload).measured_cp.position.tolist()
     return [hello.kind == MessageKind.HELLO, place == [0.1, 0.2, 0.3]]
 
 
@@ -370,40 +370,40 @@ def damaged_bytes(stream: bytes, random: np.random.Generator) -> bytes:
     return bytes(parts[random.integers(len(parts))])
 
 
-def _damaged_numbers(payload: bytes, random: np.random.Generator) -> bytes:
-    """Return a payload of numbers with some of them, or some bits, replaced; or of other length."""
-    changed = bytearray(payload)
+def _damaged_content(payload: bytes, random: np.random.Generator) -> bytes:
+    """Return a content with fields, numbers of arrays or bytes replaced."""
+    if random.random() < 0.15:
+        return damaged_bytes(payload, random)
+    content = msgspec.msgpack.decode(payload)
     for _ in range(random.integers(1, 4)):
-        choice, at = random.random(), int(random.integers(len(changed)))
-        if choice < 0.6:
-            at -= at % 8
-            changed[at : at + 8] = RAW[random.integers(len(RAW))]
-        elif choice < 0.75:
-            at -= at % 8
-            number = struct.unpack("<d", (bytes(changed[at : at + 8]) + bytes(8))[:8])[0]
-            factor = 10.0 ** random.uniform(-4.0, 4.0)
-            changed[at : at + 8] = struct.pack("<d", number * factor)
-        elif choice < 0.95:
-            changed[at] ^= 1 << int(random.integers(8))
-        elif random.random() < 0.5:
-            del changed[at:]
-        else:
-            changed += random.bytes(int(random.integers(1, 100)))
-        if not changed:
+        part, key = content, None
+        while isinstance(part, (dict, list)) and len(part):
+            inner = part
+            key = random.choice(list(part)) if isinstance(part, dict) else 0
+            part = part[key]
+            if random.random() < 0.1:
+                break
+        if key is None:
             break
-    return bytes(changed[:LARGEST_FRAME])
+        inner[key] = _damaged_part(part, random)
+    return msgspec.msgpack.encode(content)[:LARGEST_FRAME]
 
 
-def _damaged_text(content: object, random: np.random.Generator) -> bytes:
-    """Return JSON in which values, or bytes, are replaced."""
-    text = json.dumps(content)
-    for _ in range(random.integers(1, 4)):
-        values = [i for i, letter in enumerate(text) if letter in ":,["]
-        if not values or random.random() < 0.3:
-            return damaged_bytes(text.encode(), random)
-        start = int(random.choice(values)) + 1
-        end = start
-        while end < len(text) and text[end] not in ",]}":
-            end += 1
-        text = text[:start] + TEXTS[random.integers(len(TEXTS))] + text[end:]
-    return text.encode()
+def _damaged_part(part: Any, random: np.random.Generator) -> Any:
+    """Return another value for a part: another number or length of an array, or anything."""
+    choice = random.random()
+    if isinstance(part, bytes) and part and choice < 0.85:
+        changed, at = bytearray(part), 8 * int(random.integers(-(-len(part) // 8)))
+        if choice < 0.5:
+            changed[at : at + 8] = RAW[random.integers(len(RAW))]
+        elif choice < 0.65:
+            number = struct.unpack("<d", (part[at : at + 8] + bytes(8))[:8])[0]
+            changed[at : at + 8] = struct.pack("<d", number * 10.0 ** random.uniform(-4.0, 4.0))
+        elif choice < 0.8:
+            changed[int(random.integers(len(part)))] ^= 1 << int(random.integers(8))
+        else:
+            del changed[at:]
+        return bytes(changed)
+    if isinstance(part, float) and choice < 0.3:
+        return part * 10.0 ** random.uniform(-4.0, 4.0)
+    return copy.deepcopy(VALUES[random.integers(len(VALUES))])

@@ -1,6 +1,5 @@
-"""The contents of messages, one module for each of them.
+"""The contents of messages: MessagePack maps, whose fields are those of the values they carry.
 
-Numbers travel as raw little-endian float64 and int64, so a result is the same bit for bit on both
-sides. Only the description (JSON) and an error (UTF-8) are text. Nothing is pickled. The receiving
-side checks every number here.
+Arrays travel as raw little-endian bytes, so a result is the same bit for bit on both sides. Only an
+error is plain UTF-8. Nothing is pickled. The receiving side checks every number here.
 """

@@ -1,175 +1,150 @@
-"""The replies that hold a whole body: a snapshot, a surface, the number of pieces."""
+"""The replies about the whole body: snapshot, surface, pieces, chunks, accuracy of the cuts."""
 
 import math
-import struct
+from typing import Annotated
 
+import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from bridge.tcp.messages.counts import check_counts
-from bridge.tcp.wire import MessageError
-from tissue import FloatArray, Snapshot, Surface
+from bridge.tcp.messages.encoding import (
+    MAP_BYTES,
+    Array,
+    Count,
+    Message,
+    Record,
+    expect_finite,
+)
+from bridge.tcp.wire import LARGEST_FRAME, MessageError
+from tissue import (
+    Chunks,
+    CutReport,
+    FloatArray,
+    IntArray,
+    MeshMeasures,
+    Snapshot,
+    Surface,
+    SurfaceQuantity,
+)
 
-PIECES_BYTES = 8
-"""Length of a reply with the number of pieces [byte]: one integer."""
+LARGEST_CHUNKS = LARGEST_FRAME
+"""Largest reply with chunks [byte]: twenty thousand boxes, more than can be tested a thousand times
+a second."""
 
-_COUNTS = struct.Struct("<2q")
-
-_SNAPSHOT_NODE_BYTES = 3 * 8 + 3 * 8 + 3 * 8 + 8 + 1
+_NODE_BYTES = 3 * 8 + 3 * 8 + 3 * 8 + 8 + 1
 _TETRAHEDRON_BYTES = 4 * 8
-_SURFACE_VERTEX_BYTES = 3 * 8 + 3 * 8
+_VERTEX_BYTES = 3 * 8 + 3 * 8
 _TRIANGLE_BYTES = 3 * 8 + 1
+
+_Natural = Annotated[float, msgspec.Meta(ge=0.0)]
+"""A float that is not negative; infinity is the time step of a body that cannot move."""
 
 
 def snapshot_bytes(n_nodes: int, n_tetrahedra: int) -> int:
-    """Return the length of a snapshot reply [byte]."""
-    return _COUNTS.size + n_nodes * _SNAPSHOT_NODE_BYTES + n_tetrahedra * _TETRAHEDRON_BYTES
+    """Return the largest length of a snapshot [byte]."""
+    return MAP_BYTES + n_nodes * _NODE_BYTES + n_tetrahedra * _TETRAHEDRON_BYTES
 
 
 def surface_bytes(n_tetrahedra: int) -> int:
-    """Return the largest length of a surface reply [byte]: every face of every tetrahedron."""
-    n_triangles = 4 * n_tetrahedra
-    return _COUNTS.size + n_triangles * (_TRIANGLE_BYTES + 3 * _SURFACE_VERTEX_BYTES)
+    """Return the largest length of a surface [byte]: every face of every tetrahedron."""
+    return MAP_BYTES + 4 * n_tetrahedra * (_TRIANGLE_BYTES + 3 * _VERTEX_BYTES)
 
 
-def pack_snapshot(snapshot: Snapshot) -> bytes:
-    """Return a reply: the numbers of nodes and tetrahedra, then the arrays in order."""
-    return b"".join(
-        (
-            _COUNTS.pack(len(snapshot.positions), len(snapshot.tetrahedra)),
-            _floats(snapshot.positions),
-            _floats(snapshot.rest_positions),
-            _floats(snapshot.velocities),
-            _floats(snapshot.masses),
-            _integers(snapshot.tetrahedra),
-            _flags(snapshot.fixed),
+def values_bytes(n_nodes: int) -> int:
+    """Return the largest length of the values on a surface [byte]: every node is a vertex."""
+    return MAP_BYTES + 8 * n_nodes
+
+
+def _check_snapshot(snapshot: Snapshot) -> None:
+    expect_finite(*snapshot[:4])
+    _expect_indices(snapshot.tetrahedra, len(snapshot.masses), "tetrahedra")
+
+
+def _check_surface(surface: Surface) -> None:
+    expect_finite(*surface[:2])
+    _expect_indices(surface.triangles, len(surface.positions), "triangles")
+
+
+def _check_chunks(chunks: Chunks) -> None:
+    """Refuse boxes that the collision library would accept silently."""
+    boxes, fastest = chunks
+    if not (np.isfinite(boxes).all() and (boxes[:, 0] <= boxes[:, 1]).all()):
+        raise MessageError("the box of a chunk is not finite or inverted")
+    if not 0.0 <= fastest < math.inf:
+        raise MessageError(f"the fastest node moves at {fastest} m/s; wanted 0 or more, finite")
+
+
+def _check_cut_report(report: CutReport) -> None:
+    if not (report.initial.n_tetrahedra and report.now.n_tetrahedra):
+        raise MessageError("a body without a tetrahedron")
+
+
+def _expect_indices(indices: IntArray, n: int, what: str) -> None:
+    """Refuse indices that are not from 0 to n - 1."""
+    if indices.size and not (indices.min() >= 0 and indices.max() < n):
+        raise MessageError(
+            f"{what} refer to points {indices.min()} to {indices.max()}; there are {n}"
         )
-    )
 
 
-def unpack_snapshot(payload: bytes) -> Snapshot:
-    """Return the snapshot in a reply.
+_MEASURES = Record(
+    MeshMeasures,
+    n_tetrahedra=Count,
+    **dict.fromkeys(MeshMeasures._fields[1:], _Natural),
+)
 
-    Raises:
-        MessageError: the lengths do not agree, a number is not finite, or a tetrahedron refers to
-            a node that does not exist.
-    """
-    reader = _ArrayReader(payload)
-    n_nodes, n_tetrahedra = reader.counts
-    check_counts(n_nodes, n_tetrahedra)
-    reader.expect(snapshot_bytes(n_nodes, n_tetrahedra))
-    positions = reader.floats((n_nodes, 3), "positions")
-    rest_positions = reader.floats((n_nodes, 3), "rest positions")
-    velocities = reader.floats((n_nodes, 3), "velocities")
-    masses = reader.floats((n_nodes,), "masses")
-    tetrahedra = reader.indices((n_tetrahedra, 4), n_nodes, "tetrahedra")
-    fixed = reader.flags(n_nodes, "fixed")
-    return Snapshot(positions, rest_positions, velocities, masses, tetrahedra, fixed)
+SNAPSHOT: Message[Snapshot] = Message(
+    Record(
+        Snapshot,
+        positions=("nodes", 3),
+        rest_positions=("nodes", 3),
+        velocities=("nodes", 3),
+        masses=("nodes",),
+        tetrahedra=("tetrahedra", 4),
+        fixed=("nodes",),
+    ),
+    "the snapshot",
+    _check_snapshot,
+)
+"""The reply with the state of the whole body."""
 
+SURFACE: Message[Surface] = Message(
+    Record(
+        Surface,
+        positions=("vertices", 3),
+        rest_positions=("vertices", 3),
+        triangles=("triangles", 3),
+        is_cut=("triangles",),
+    ),
+    "the surface",
+    _check_surface,
+)
+"""The reply with the boundary triangles."""
 
-def pack_surface(surface: Surface) -> bytes:
-    """Return a reply: the numbers of vertices and triangles, then the arrays in order."""
-    return b"".join(
-        (
-            _COUNTS.pack(len(surface.positions), len(surface.triangles)),
-            _floats(surface.positions),
-            _floats(surface.rest_positions),
-            _integers(surface.triangles),
-            _flags(surface.is_cut),
-        )
-    )
+QUANTITY: Message[SurfaceQuantity] = Message(SurfaceQuantity, "the name of a quantity")
+"""The request for a quantity at the vertices of the surface."""
 
+VALUES: Message[FloatArray] = Message(
+    Array(np.float64, ("vertices",), "the array"), "values on the surface", expect_finite
+)
+"""The reply to it."""
 
-def unpack_surface(payload: bytes) -> Surface:
-    """Return the surface in a reply.
+CHUNKS: Message[Chunks] = Message(
+    Record(Chunks, boxes=("chunks", 2, 3)), "the chunks of the body", _check_chunks
+)
+"""The reply with boxes that hold the body, for the broad phase."""
 
-    Raises:
-        MessageError: the lengths do not agree, a number is not finite, or a triangle refers to a
-            vertex that does not exist.
-    """
-    reader = _ArrayReader(payload)
-    n_vertices, n_triangles = reader.counts
-    check_counts(n_vertices, n_triangles)
-    reader.expect(_COUNTS.size + n_vertices * _SURFACE_VERTEX_BYTES + n_triangles * _TRIANGLE_BYTES)
-    positions = reader.floats((n_vertices, 3), "positions")
-    rest_positions = reader.floats((n_vertices, 3), "rest positions")
-    triangles = reader.indices((n_triangles, 3), n_vertices, "triangles")
-    return Surface(positions, rest_positions, triangles, reader.flags(n_triangles, "is_cut"))
+PIECES: Message[int] = Message(Count, "the number of pieces")
+"""The reply with the number of connected pieces."""
 
-
-def pack_pieces(n_pieces: int) -> bytes:
-    """Return a reply: the number of pieces."""
-    return struct.pack("<q", n_pieces)
-
-
-def unpack_pieces(payload: bytes) -> int:
-    """Return the number of pieces in a reply.
-
-    Raises:
-        MessageError: the number is missing or negative.
-    """
-    if len(payload) != PIECES_BYTES:
-        raise MessageError(f"a number of pieces of {len(payload)} bytes; wanted {PIECES_BYTES}")
-    n_pieces = int.from_bytes(payload, "little", signed=True)
-    if n_pieces < 0:
-        raise MessageError(f"a body of {n_pieces} pieces; wanted 0 or more")
-    return n_pieces
-
-
-def _floats(array: FloatArray) -> bytes:
-    return np.ascontiguousarray(array, "<f8").tobytes()
-
-
-def _integers(array: npt.NDArray[np.int64]) -> bytes:
-    return np.ascontiguousarray(array, "<i8").tobytes()
-
-
-def _flags(array: npt.NDArray[np.bool_]) -> bytes:
-    return np.ascontiguousarray(array, np.uint8).tobytes()
-
-
-class _ArrayReader:
-    """Reads one array after the other from a payload. Arrays are copies."""
-
-    def __init__(self, payload: bytes) -> None:
-        if len(payload) < _COUNTS.size:
-            raise MessageError(f"a body of {len(payload)} bytes; wanted {_COUNTS.size} at least")
-        self.counts: tuple[int, int] = _COUNTS.unpack_from(payload)
-        self._payload = payload
-        self._at = _COUNTS.size
-
-    def expect(self, n_bytes: int) -> None:
-        """Check the length of the payload [byte]."""
-        if len(self._payload) != n_bytes:
-            raise MessageError(
-                f"a body of {self.counts} points and elements in {len(self._payload)} bytes; "
-                f"wanted {n_bytes}"
-            )
-
-    def floats(self, shape: tuple[int, ...], what: str) -> FloatArray:
-        """Return the next array of float64, all finite."""
-        array = self._take(shape, "<f8").astype(np.float64)
-        if not np.isfinite(array).all():
-            raise MessageError(f"{what} are not finite")
-        return array
-
-    def indices(self, shape: tuple[int, ...], n: int, what: str) -> npt.NDArray[np.int64]:
-        """Return the next array of indices from 0 to n - 1."""
-        array = self._take(shape, "<i8").astype(np.int64)
-        if array.size and not (array.min() >= 0 and array.max() < n):
-            raise MessageError(
-                f"{what} refer to points {array.min()} to {array.max()}; there are {n}"
-            )
-        return array
-
-    def flags(self, n: int, what: str) -> npt.NDArray[np.bool_]:
-        """Return the next array of n flags."""
-        array = self._take((n,), "u1")
-        if array.size and array.max() > 1:
-            raise MessageError(f"a flag of {what} is neither 0 nor 1")
-        return array.astype(np.bool_)
-
-    def _take(self, shape: tuple[int, ...], dtype: str) -> npt.NDArray[np.generic]:
-        array = np.frombuffer(self._payload, dtype, math.prod(shape), self._at).reshape(shape)
-        self._at += array.nbytes
-        return array
+CUT_REPORT: Message[CutReport] = Message(
+    Record(
+        CutReport,
+        n_cut_nodes=Count,
+        initial=_MEASURES,
+        now=_MEASURES,
+        **dict.fromkeys(CutReport._fields[1:5], _Natural),
+    ),
+    "the report about the cuts",
+    _check_cut_report,
+)
+"""The reply with the path error of the cuts, and their effect on the mesh."""

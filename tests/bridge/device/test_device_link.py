@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bridge import DeviceClient, LinkError, TcpLink, parse_address
-from bridge.device.messages import ServoRequest, pack_servo
+from bridge.device.messages import SERVO, ServoRequest
 from bridge.tcp.wire import MessageKind, pack_frame
 from tests.bridge.device.served_blade import ORIGIN, POSE, STATE, UNTURNED, served_blade
 from tests.bridge.tcp.bare_sockets import HELLO, connected, read_one
@@ -40,7 +40,7 @@ def wait_for(blade, what):
 
 def servo_frame(number, stamp, position=ORIGIN):
     request = ServoRequest(stamp, 1e-3, POSE._replace(position=np.array(position)), True)
-    return pack_frame(MessageKind.SERVO, number, pack_servo(request))
+    return pack_frame(MessageKind.SERVO, number, SERVO.pack(request))
 
 
 def bare_device(address):
@@ -182,7 +182,7 @@ def test_a_tissue_is_not_taken_for_a_run_nor_a_run_for_a_tissue(served, server):
         TcpLink(served[1])
 
 
-def test_a_client_of_forty_lines_leads_the_blade_and_prints_its_force(served):
+def test_a_client_of_fifty_lines_drives_the_blade_and_prints_its_force(served):
     blade, address = served
     done = run_example(address)
     assert (done.returncode, done.stderr) == (0, "")
@@ -194,11 +194,11 @@ def test_a_client_of_forty_lines_leads_the_blade_and_prints_its_force(served):
     assert ys[-1] == pytest.approx(0.2 + 0.06, abs=1e-3), "3 s at 20 mm/s from where the blade was"
 
 
-def test_the_client_is_fifty_lines_and_imports_only_the_standard_library():
+def test_the_client_is_fifty_lines_and_imports_only_msgpack_besides_the_standard_library():
     text = EXAMPLE.read_text()
     assert len([line for line in text.splitlines() if line.strip()]) <= 50
     imported = re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE)
-    assert set(imported) <= set(sys.stdlib_module_names)
+    assert set(imported) <= {"msgpack", *sys.stdlib_module_names}
 
 
 def test_the_client_waits_for_a_run_that_gets_ready_meanwhile():

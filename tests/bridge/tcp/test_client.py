@@ -6,6 +6,7 @@ import socket
 import struct
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,7 @@ import pytest
 from bridge import Bridge, InProcessLink, LinkError, SceneView, TcpLink
 from bridge.driven import FrameAttachment, FramePose
 from bridge.tcp.address import parse_address
-from bridge.tcp.messages.result import pack_result
-from bridge.tcp.messages.step import pack_step
+from bridge.tcp.messages.step import RESULT, pack_step
 from bridge.tcp.messages.text import pack_error, unpack_error
 from bridge.tcp.peer import HANDSHAKE_BYTES
 from bridge.tcp.server import TissueServer
@@ -126,7 +126,7 @@ def test_what_the_tissue_refuses_is_a_refused_request(link, upright):
         (bytes(100), "is not scalpel-sim"),
         (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
-        (HELLO[:4] + b"\x07\x00" + HELLO[6:], "uses version 7 of the protocol and this one 8"),
+        (HELLO[:4] + b"\x08\x00" + HELLO[6:], "uses version 8 of the protocol and this one 9"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
         (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],
@@ -298,7 +298,8 @@ def test_a_reply_about_other_frames_than_there_are_breaks_the_link(monkeypatch):
     threading.Thread(target=server.run, daemon=True).start()
     with contextlib.closing(TcpLink(server.address)) as link:
         link.attach(FrameAttachment("top", 100.0))
-        monkeypatch.setattr("bridge.tcp.server.pack_result", lambda result, *_: pack_result(result))
+        of_none = SimpleNamespace(pack=lambda reply: RESULT.pack(reply._replace(loads=())))
+        monkeypatch.setattr("bridge.tcp.server.RESULT", of_none)
         at = FramePose(np.array([0.01, 0.01, 0.02]), np.eye(3))
         with pytest.raises(LinkError, match="loads on 0 frames; there are 1"):
             link.step(None, DT, [at])

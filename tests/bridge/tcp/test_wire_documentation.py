@@ -5,15 +5,18 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from bridge.device.messages import pack_state
+from bridge.device.messages import DEVICE_DESCRIPTION, SERVO
+from bridge.device.messages import STATE as DEVICE_STATE
+from bridge.driven import GeomLoads
 from bridge.tcp.address import IDLE_SECONDS, N_PROBES, PROBE_SECONDS, parse_address
 from bridge.tcp.channel import Authenticator, direction_keys
-from bridge.tcp.messages.geoms import MAX_GEOMS
-from bridge.tcp.messages.result import pack_result
-from bridge.tcp.messages.text import MAX_VIEWS, WANTED_NAME
+from bridge.tcp.messages.body import CHUNKS, CUT_REPORT, SNAPSHOT, SURFACE
+from bridge.tcp.messages.driven import ATTACHMENT, GEOMS, MAX_GEOMS, TIE
+from bridge.tcp.messages.encoding import Array
+from bridge.tcp.messages.step import RESULT, STEP
+from bridge.tcp.messages.text import DESCRIPTION, MAX_VIEWS, WANTED_NAME
 from bridge.tcp.peer import (
     FRAME_SECONDS,
     HANDSHAKE_BYTES,
@@ -29,16 +32,13 @@ from bridge.tcp.request_limits import (
 )
 from bridge.tcp.single_client import MAX_STRANGERS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
-from tests.bridge.device.served_blade import STATE
-from tests.bridge.tcp.serve_block import block_tissue
 from tests.bridge.tcp.test_places import server_in_a_thread
 from tests.processes import free_port, started_first
-from tissue import Energies, RigidContacts
+from tissue import BodyContacts, MeshMeasures, RigidContacts, StageTimes
 from tissue.contact.geoms.geom_contact import MOST_INCREMENTS
 
 DOCS = Path(__file__).parents[3] / "docs"
 WIRE = (DOCS / "wire.md").read_text(encoding="utf-8")
-STEP, DEVICE = WIRE.split("## A device that leads")
 CLIENT = DOCS / "examples" / "client.py"
 
 
@@ -48,7 +48,7 @@ def run_client(port):
     )
 
 
-def test_a_client_of_forty_lines_cuts_the_tissue_and_prints_its_force(server):
+def test_a_client_of_some_forty_lines_cuts_the_tissue_and_prints_its_force(server):
     done = run_client(parse_address(server.address)[1])
     assert (done.returncode, done.stderr) == (0, "")
     rows = re.findall(r"(\d+) ms: ([+-][\d.]+) N along y, (\d+) mm2 cut", done.stdout)
@@ -57,11 +57,11 @@ def test_a_client_of_forty_lines_cuts_the_tissue_and_prints_its_force(server):
     assert float(rows[-1][2]) == pytest.approx(20 * 20, rel=0.05)
 
 
-def test_the_client_is_forty_lines_and_imports_only_the_standard_library():
+def test_the_client_is_short_and_imports_only_msgpack_besides_the_standard_library():
     lines = [line for line in CLIENT.read_text().splitlines() if line.strip()]
-    assert len(lines) <= 40
+    assert len(lines) <= 42
     imported = re.findall(r"^(?:import|from) (\w+)", CLIENT.read_text(), re.MULTILINE)
-    assert set(imported) <= set(sys.stdlib_module_names)
+    assert set(imported) <= {"msgpack", *sys.stdlib_module_names}
 
 
 def test_the_client_waits_for_a_server_that_gets_ready_meanwhile():
@@ -74,21 +74,6 @@ def test_the_client_prints_why_the_server_refuses_it(start_server):
     server = start_server(key=bytes(32))
     done = run_client(parse_address(server.address)[1])
     assert done.returncode == 1 and "this server requires a key" in done.stderr
-
-
-def test_the_numbers_of_a_state_are_where_the_table_says():
-    payload = pack_state(STATE._replace(n_missed=8, n_dropped=9))
-    rows = re.findall(r"^\| (\d+) \| (f64|i64|u32) x (\d)", DEVICE, re.MULTILINE)
-    types = {"f64": "<f8", "i64": "<i8", "u32": "<u4"}
-    found = [np.frombuffer(payload, types[t], int(n), int(at)).tolist() for at, t, n in rows]
-    assert found == [
-        [STATE.time, STATE.real_time_factor],
-        [*STATE.measured_cp.position, *STATE.measured_cp.orientation],
-        [*STATE.measured_cf.force, *STATE.measured_cf.torque],
-        [STATE.n_limited, 8, 9],
-        [1, 0],
-    ]
-    assert len(payload) == int(rows[-1][0]) + 8
 
 
 def test_every_kind_of_message_is_in_the_table():
@@ -107,7 +92,7 @@ def test_the_limits_are_those_of_the_server():
     assert f"until HELLO is done, {HANDSHAKE_BYTES} bytes" in WIRE
     assert f"complete after {FRAME_SECONDS:g} s, and a reply read after {SEND_SECONDS:g} s" in WIRE
     assert f"HELLO must be done {HANDSHAKE_SECONDS:g} s" in WIRE
-    assert f"Beside the client's at most {MAX_STRANGERS} connections" in WIRE
+    assert f"Besides the client's at most {MAX_STRANGERS} connections" in WIRE
     assert f"at least every {SILENCE_SECONDS:g} s" in WIRE
     gone = IDLE_SECONDS + N_PROBES * PROBE_SECONDS
     assert f"has not answered the system for {gone} s" in WIRE
@@ -117,53 +102,60 @@ def test_the_limits_are_those_of_the_server():
     assert f"more than {MOST_WORK / 1e6:g} million" in WIRE
     assert f"{WANTED_NAME}" in WIRE
     assert f"at most {MAX_GEOMS}." in WIRE and f"more than {MOST_INCREMENTS:,}, is refused" in WIRE
-    assert f"a list of at most {MAX_VIEWS}\ncameras" in WIRE
+    assert f"at most {MAX_VIEWS} cameras" in WIRE
 
 
-def test_the_numbers_of_a_result_are_where_the_table_says():
-    random, n = np.random.default_rng(0), 3
-    shapes = ((n, 3), (n, 3), n, (n, 3), n)
-    contacts = RigidContacts(*map(random.random, shapes), geom=np.arange(n) - 1)
-    result = (
-        block_tissue().step(None, 1e-3)._replace(contacts=contacts, energies=Energies(*range(14)))
-    )
-    payload = pack_result(result)
+TYPES = {"float64": "f64", "int64": "i64", "bool": "u8"}
 
-    def at(offset, count):
-        return np.frombuffer(payload, "<f8", count, offset)
 
-    rows = re.findall(
-        r"^\| (\d+)(?: \+ (\d+)n)? \| f64 x (\d+)(n?) \| ([\w ]+)", STEP, re.MULTILINE
-    )
-    found = {
-        name.strip(): at(int(offset) + int(each or 0) * n, int(count) * (n if per_contact else 1))
-        for offset, each, count, per_contact, name in rows
-    }
-    expected = {
-        "length of the edge in the tissue": (
-            result.anchored_length,
-            result.cut_area,
-            result.finished_area,
-            result.work_of_blade,
-            result.work_of_cutting,
-        ),
-        "contacts of the body with itself": (
-            result.body_contacts.penetration,
-            result.body_contacts.force,
-        ),
-        "wall time of collision": result.stage_times,
-        "wrench on the blade": np.concatenate(result.wrench),
-        "wrench at the end of the step": np.concatenate(result.wrench_t1),
-        "local stiffness": result.stiffness.ravel(),
-        "force on the tissue": result.force_on_tissue,
-        "lowest and highest corner of the body": result.bounds.ravel(),
-        "force of the floor on the body": result.body_contacts.force_of_floor,
-        "contacts of blade and geoms": np.concatenate([array.ravel() for array in contacts]),
-        "energies where the server audits them": np.arange(14.0),
-    }
-    assert set(found) == set(expected)
-    for name, numbers in expected.items():
-        np.testing.assert_array_equal(found[name], numbers, err_msg=name)
+def documented(heading):
+    """Return names and types of fields in each table under a heading, in order."""
+    section = re.split(r"^## ", WIRE.split(f"\n## {heading}\n")[1], flags=re.MULTILINE)[0]
+    tables = section.split("| field | type | what |")[1:]
+    return [dict(re.findall(r"^\| (\w+) \| ([^|]+?) \|", each, re.MULTILINE)) for each in tables]
+
+
+def described(message):
+    """Return names and types of the fields of a message, or of a part of one."""
+    parts = getattr(message, "_part", message)._parts
+    return {name: array_type(part) for name, part in parts.items()}
+
+
+def array_type(part):
+    if not isinstance(part, Array):
+        return None
+    lengths = " x ".join(map(str, (part._first, *part._rest)))
+    return f"{TYPES[part._scalar.name]} {lengths}"
+
+
+RESULT_PART = RESULT._part._parts["result"]
+
+
+@pytest.mark.parametrize(
+    ("heading", "messages"),
+    [
+        ("HELLO", [DESCRIPTION]),
+        ("STEP", [STEP, RESULT, RESULT_PART]),
+        ("The body", [SNAPSHOT, SURFACE, CHUNKS, CUT_REPORT]),
+        ("Driven frames", [ATTACHMENT, TIE]),
+        ("Driven geoms", [GEOMS]),
+        ("A device that drives", [DEVICE_DESCRIPTION, SERVO, DEVICE_STATE]),
+    ],
+)
+def test_the_fields_of_each_message_are_in_its_table(heading, messages):
+    tables = documented(heading)
+    assert len(tables) == len(messages)
+    for table, message in zip(tables, messages, strict=True):
+        fields = described(message)
+        assert list(table) == list(fields)
+        for name, array in fields.items():
+            if array is not None:
+                assert table[name].removesuffix(", optional") == array, name
+
+
+@pytest.mark.parametrize("part", [RigidContacts, BodyContacts, StageTimes, GeomLoads, MeshMeasures])
+def test_the_fields_of_each_part_are_named(part):
+    assert [name for name in part._fields if f"`{name}`" not in WIRE] == []
 
 
 def test_the_tags_of_the_documentation_are_those_of_the_link():

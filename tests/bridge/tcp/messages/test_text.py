@@ -1,21 +1,27 @@
+"""The description of a tissue arrives with every property, and an impossible one is refused."""
+
+import msgspec
 import numpy as np
 import pytest
 
+from bridge.device.messages import DEVICE_DESCRIPTION, DeviceDescription
 from bridge.link import SceneView, TissueDescription
 from bridge.tcp.messages.text import (
+    DESCRIPTION,
     LARGEST_DESCRIPTION,
     LARGEST_ERROR,
     MAX_VIEWS,
-    pack_description,
     pack_error,
-    unpack_description,
+    sent_scene_name,
     unpack_error,
 )
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
+from tests.bridge.changed_messages import changed, raw
 from tissue import BladeShape, Material
 
 VIEW = SceneView("from above", (0.0, 0.0, 1.0), (0.1, 0.2, 0.3), (0.0, 1.0, 0.0), 38.0)
+BOUNDS = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 
 
 def test_a_description_arrives_with_every_property_of_material_and_blade():
@@ -46,46 +52,41 @@ def test_a_description_arrives_with_every_property_of_material_and_blade():
         -0.01,
         (VIEW, VIEW._replace(name="µ", eye=(-0.0, 1.0 / 3.0, 1e-300))),
     )
-    received = unpack_description(pack_description(sent))
+    received = DESCRIPTION.unpack(DESCRIPTION.pack(sent))
     assert bits(received.bounds) == bits(sent.bounds)
     assert received._replace(bounds=None) == sent._replace(bounds=None)
 
 
-def test_the_longest_error_fits():
-    assert len(pack_error("\U0001f52a" * 10**6)) <= LARGEST_ERROR
-
-
-@pytest.mark.parametrize("density", [b"-1000.0", b"null", b"1e999", b'"heavy"'])
-def test_a_description_of_an_impossible_material_is_refused(density):
-    bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    packed = pack_description(TissueDescription("organ", Material(density=1000.0), bounds, 1, 4))
-    assert unpack_description(packed)
-    with pytest.raises(MessageError, match=r"density|out of range"):
-        unpack_description(packed.replace(b'"density":1000.0', b'"density":' + density))
+def described(*views, scene="organ"):
+    material = Material(law="neo_hookean", prony=((0.3, 0.1),))
+    return DESCRIPTION.pack(TissueDescription(scene, material, BOUNDS, 1, 4, views=views))
 
 
 @pytest.mark.parametrize(
-    "series", [b"null", b"[0.3]", b'[["a", 0.1]]', b"[[0.3, 0.1, 1]]", b"[[2, 1]]"]
+    ("change", "why"),
+    [
+        ({"material__density": -1000.0}, "density"),
+        ({"material__density": None}, "density"),
+        ({"material__density": "heavy"}, "density"),
+        ({"material__prony": None}, "prony"),
+        ({"material__prony": [["a", 0.1]]}, "prony"),
+        ({"material__prony": [[2, 1]]}, "prony"),
+        ({"bounds": raw(1, 1, 1, 0, 0, 0)}, "the lowest first"),
+        ({"bounds": raw(*[np.nan] * 6)}, "finite corners"),
+        ({"floor": np.inf}, "floor"),
+    ],
 )
-def test_a_description_of_an_impossible_prony_series_is_refused(series):
-    bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    material = Material(law="neo_hookean", prony=((0.3, 0.1),))
-    packed = pack_description(TissueDescription("organ", material, bounds, 1, 4))
-    assert unpack_description(packed).material == material
-    with pytest.raises(MessageError, match=r"prony|\$\.material"):
-        unpack_description(packed.replace(b'"prony":[[0.3,0.1]]', b'"prony":' + series))
-
-
-def described(*views):
-    bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    return pack_description(TissueDescription("organ", Material(), bounds, 1, 4, views=views))
+def test_an_impossible_description_is_refused(change, why):
+    assert DESCRIPTION.unpack(described())
+    with pytest.raises(MessageError, match=why):
+        DESCRIPTION.unpack(changed(described(), **change))
 
 
 def test_as_many_views_as_there_may_be_fit():
     longest = SceneView("\U0001f52a" * 40, *[(-1.0 / 3.0e-100,) * 3] * 3, 100.0 / 3.0)
     packed = described(*[longest] * MAX_VIEWS)
     assert len(packed) <= LARGEST_DESCRIPTION
-    assert unpack_description(packed).views == (longest,) * MAX_VIEWS
+    assert DESCRIPTION.unpack(packed).views == (longest,) * MAX_VIEWS
 
 
 @pytest.mark.parametrize(
@@ -94,7 +95,7 @@ def test_as_many_views_as_there_may_be_fit():
         ([VIEW] * (MAX_VIEWS + 1), f"length <= {MAX_VIEWS}"),
         ([VIEW._replace(name="a\x1b[2J")], "a control character in its name"),
         ([VIEW._replace(name="a" * 101)], "length <= 100"),
-        ([VIEW._replace(eye=(0.0, 0.0, np.nan))], "got `null`"),
+        ([VIEW._replace(eye=(0.0, 0.0, np.nan))], "eye"),
         ([VIEW._replace(up=(0.0, 0.0))], "length 3"),
         ([VIEW._replace(fov_degrees=180.0)], "< 180"),
         ([VIEW._replace(fov_degrees=0.0)], "> 0"),
@@ -102,9 +103,47 @@ def test_as_many_views_as_there_may_be_fit():
 )
 def test_a_description_with_an_impossible_view_is_refused(views, why):
     with pytest.raises(MessageError, match=why):
-        unpack_description(described(*views))
+        DESCRIPTION.unpack(described(*views))
+
+
+@pytest.mark.parametrize("name", ["organ", "my_scene-2", "a" * 64])
+def test_a_scene_name_is_sent_as_it_is(name):
+    assert sent_scene_name(name) == name
+
+
+@pytest.mark.parametrize(
+    ("name", "sent"),
+    [
+        ("/etc/passwd", "_etc_passwd"),
+        ("../../.ssh", "_______ssh"),
+        ("C:\\x", "C__x"),
+        ("a\n", "a_"),
+        ("\x1b[31m", "__31m"),
+        ("ä", "_"),
+        ("a" * 65, "a" * 64),
+        ("", "tissue"),
+    ],
+)
+def test_no_scene_name_is_a_path_for_another_process(name, sent):
+    assert sent_scene_name(name) == sent
+    for message, packed in (
+        (DESCRIPTION, described(scene=name)),
+        (DEVICE_DESCRIPTION, DEVICE_DESCRIPTION.pack(DeviceDescription(name, 0.04, 0.2, 2.0))),
+    ):
+        with pytest.raises(MessageError, match=r"\$.scene"):
+            message.unpack(packed)
+        assert message.unpack(changed(packed, scene=sent)).scene == sent
+
+
+def test_the_longest_error_fits():
+    assert len(pack_error("\U0001f52a" * 10**6)) <= LARGEST_ERROR
 
 
 def test_an_error_arrives_without_its_control_characters():
     assert unpack_error(pack_error("no blade: 3 µm")) == "no blade: 3 µm"
     assert unpack_error(b"gone\x1b[2J\n") == "gone\ufffd[2J\ufffd"
+
+
+def test_an_error_is_no_messagepack_so_that_every_version_reads_it():
+    with pytest.raises(msgspec.DecodeError):
+        msgspec.msgpack.decode(pack_error("no blade"))

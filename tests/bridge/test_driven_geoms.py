@@ -1,4 +1,4 @@
-"""Geoms that the arm's side leads, over the link in this process."""
+"""Geoms that the arm's side drives, over the link in this process."""
 
 import time
 
@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from bridge import Bridge, GeomLoads, GeomPoses, InProcessLink, VirtualCoupling
 from bridge.driven import mean_geom_loads
 from tests.bridge.bits import bits
-from tests.bridge.test_driven import CUBE, DT, FAR, cube
+from tests.bridge.test_driven_frames import CUBE, DT, FAR, cube
 from tissue import Geom, fixed_nodes
 
 BALL = Geom("ball", "sphere", (0.004,), 0.3)
@@ -23,7 +23,7 @@ def places(i):
     return GeomPoses(np.array([[0.01, 0.01, 0.0241 - 2e-5 * i], [0.0, 0.0, -1e-4]]), turned)
 
 
-def test_led_geoms_act_as_those_that_the_tissue_itself_touches():
+def test_driven_geoms_act_as_those_that_the_tissue_itself_touches():
     led, touched = InProcessLink(cube()), cube()
     led.collide_with(BOTH, places(0))
     contact = touched.collide_with(BOTH, *places(0))
@@ -84,7 +84,7 @@ def test_a_bridge_s_geoms_feel_what_those_of_the_tissue_feel():
 
 
 @pytest.mark.parametrize("changes", [{"tissue_every": 4}, {"coupling": VirtualCoupling()}])
-def test_where_the_tissue_is_asked_seldom_the_geoms_go_as_they_were_led(changes):
+def test_where_the_tissue_is_queried_seldom_the_geoms_go_as_they_were_driven(changes):
     """One that is there from the middle of a period is at rest up to there."""
     tissue = cube()
     bridge = Bridge(tissue, **changes)
