@@ -107,26 +107,6 @@ def test_the_first_call_does_not_move_the_blade(block_tissue, upright):
     assert bridge.result.cut_area == 0.0
 
 
-def test_where_the_broad_phase_rejects_the_tissue_finds_no_active_tetrahedron(
-    block_tissue, upright
-):
-    filtered, unfiltered = block_tissue(), block_tissue()
-    bridge = Bridge(InProcessLink(filtered))
-    before, n_rejected = upright(0.009, -0.03), 0
-    for i in range(400):  # in from one side, out at the other
-        segment = upright(0.009, -0.03 + 0.2 * DT * i)
-        rejected_before = bridge.counters.rejected
-        bridge.step(segment, DT)
-        without_filter = unfiltered.step(BladeSweep(before, segment), DT)
-        if bridge.counters.rejected > rejected_before:
-            assert without_filter.n_active == 0
-            assert without_filter.anchored_length == 0.0
-            n_rejected += 1
-        before = segment
-    assert 50 < n_rejected < 350
-    assert bridge.result.cut_area == pytest.approx(without_filter.cut_area)
-
-
 def horseshoe(blade):
     """Return a bar of soft tissue that is bent into half a ring around z and held at its middle."""
     mesh = block((12, 2, 3), (0.06, 0.01, 0.01))
@@ -324,26 +304,6 @@ def test_a_virtual_coupling_keeps_the_blade_that_cuts_out_of_a_wall(upright):
     # 20 kN/m and 700 N/m in series, pressed in by 2 mm.
     assert felt.force[1] == pytest.approx(-2e-3 / (1.0 / 700.0 + 1.0 / 20e3), rel=1e-3)
     assert wall.queries[-1][0].t1.tip[1] == pytest.approx(-felt.force[1] / 20e3, rel=1e-3)
-
-
-@pytest.mark.parametrize("coupling", [None, VirtualCoupling()], ids=["rigid", "virtual"])
-def test_the_wrench_between_two_answers_turns_with_the_tissue(upright, coupling):
-    turned = TissueFrame(
-        np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([0.3, -0.1, 0.2])
-    )
-    bridges = [
-        Bridge(RecordingWall(), frame, tissue_every=10, coupling=coupling)
-        for frame in (TissueFrame(), turned)
-    ]
-    for pose in in_and_out(upright):
-        straight, felt = (
-            bridge.step(posed, DT)
-            for bridge, posed in zip(bridges, (pose, turned.segment_to_world(pose)), strict=True)
-        )
-        wanted = turned.wrench_to_world(straight)
-        for name in ("force", "torque", "point"):
-            assert getattr(felt, name) == pytest.approx(getattr(wanted, name), abs=1e-9)
-    assert bridges[0].counters.answers == 33
 
 
 @pytest.mark.parametrize("every", [0, -1, 1.5, 101])

@@ -4,7 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import FixtureBox, FixtureMesh
-from bridge.collision.broad_phase import BroadPhase
+from bridge.collision.broad_phase import BroadPhase, ChunkBoxes, not_separated
+from bridge.collision.collision_objects import MovableBox
+from bridge.collision.swept_box import box_around
 from bridge.poses import pose_of
 from tissue import BladeSegment, BladeShape, BladeSweep, Chunks
 
@@ -208,3 +210,24 @@ def test_the_body_of_a_blade_touches_tissue_that_its_edge_does_not():
     sweep = BladeSweep(blade, blade)
     assert not overlaps(BroadPhase(UNIT_BOX, 0.0), sweep, DT).tissue
     assert overlaps(BroadPhase(UNIT_BOX, 0.0, blade=shape), sweep, DT).tissue
+
+
+CHUNK = np.array([[[0.0, 0, 0], [1, 1, 1]]])
+
+
+def stick(start, end):
+    """Return a thin box around a line segment, aligned with it."""
+    along = (end - start) / np.linalg.norm(end - start)
+    across = np.linalg.qr(np.stack([along, *np.eye(3)[:2] + 0.1], axis=1))[0]
+    return box_around(np.stack([start, end]), across)
+
+
+def test_a_stick_that_only_a_pair_of_edges_separates_is_left_to_the_collision_library():
+    rng, n_left_over = np.random.default_rng(0), 0
+    for _ in range(2000):
+        box = stick(*rng.uniform(-1.0, 2.0, (2, 3)))
+        movable = MovableBox()
+        movable.place(box)
+        is_left_over = len(not_separated(box, CHUNK)) > 0
+        n_left_over += is_left_over and not ChunkBoxes().collide_with(box, movable.object, CHUNK)
+    assert n_left_over > 10

@@ -2,7 +2,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.tcp.channel import LARGEST_PART, Channel, direction_keys
+from bridge.tcp.channel import (
+    LARGEST_PART,
+    Authenticator,
+    Channel,
+    direction_keys,
+    new_nonce,
+)
 from bridge.tcp.wire import (
     HEADER_BYTES,
     LARGEST_FRAME,
@@ -84,3 +90,48 @@ def test_only_the_first_answer_to_a_client_may_be_an_error_without_a_tag():
     received(client, server.pack(MessageKind.HELLO, 1))
     with pytest.raises(MessageError, match="authentication tag is wrong"):
         received(client, [refusal])
+
+
+KEY = bytes(range(32))
+
+
+def sent(payload, authenticator=None, kind=MessageKind.STEP, sequence=7):
+    """Return the frame of a payload with its authentication tag."""
+    return Frame(
+        kind, sequence, (authenticator or Authenticator(KEY)).with_tag(kind, sequence, payload)
+    )
+
+
+@given(st.binary(max_size=50), st.data())
+def test_a_message_with_a_changed_byte_is_not_verified(payload, data):
+    frame = sent(payload)
+    changed = bytearray(frame.payload)
+    changed[data.draw(st.integers(0, len(changed) - 1))] ^= data.draw(st.integers(1, 255))
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
+        Authenticator(KEY).verified(frame._replace(payload=bytes(changed)))
+
+
+@pytest.mark.parametrize(
+    "change", [{"kind": MessageKind.SNAPSHOT}, {"sequence": 8}, {"payload": b""}]
+)
+def test_a_tag_does_not_verify_another_message(change):
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
+        Authenticator(KEY).verified(sent(b"to cut")._replace(**change))
+
+
+def test_a_repeated_or_omitted_message_is_detected():
+    sender, receiver = Authenticator(KEY), Authenticator(KEY)
+    first, second = sent(b"1", sender), sent(b"2", sender)
+    with pytest.raises(MessageError):
+        receiver.verified(second)
+    receiver.verified(first)
+    with pytest.raises(MessageError):
+        receiver.verified(first)
+    assert receiver.verified(second).payload == b"2"
+
+
+def test_each_direction_of_each_conversation_has_its_own_key():
+    nonces = [new_nonce() for _ in range(4)]
+    keys = [*direction_keys(KEY, *nonces[:2]), *direction_keys(KEY, *nonces[2:])]
+    keys += direction_keys(bytes(32), *nonces[:2])
+    assert len(set(keys)) == len(keys) == 6

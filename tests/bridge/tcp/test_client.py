@@ -233,15 +233,6 @@ def test_strangers_that_flood_the_server_do_not_change_a_cut(server, upright):
     assert_serves(server)
 
 
-def test_a_client_that_reconnects_in_the_middle_of_a_cut_finds_a_whole_body(start_server, upright):
-    server = start_server()
-    with contextlib.closing(TcpLink(server.address)) as link:
-        whole = bits(link.snapshot())
-        assert cut(link, upright)[-1].cut_area > 0.0
-    with contextlib.closing(link_once_free(server.address)) as link:
-        assert bits(link.snapshot()) == whole
-
-
 def test_an_old_request_is_not_executed_twice(server):
     with connected_client(server.address) as peer:
         step = pack_frame(MessageKind.STEP, 1, pack_step(None, DT))

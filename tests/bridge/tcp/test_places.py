@@ -1,4 +1,7 @@
-"""Who may stay connected: the client while it is there, and newcomers before those who wait."""
+"""Who may stay connected: the client while it is there, and newcomers before those who wait.
+
+And how a server reports a request that fails.
+"""
 
 import contextlib
 import os
@@ -35,6 +38,7 @@ from tests.bridge.tcp.bare_sockets import (
     read_one,
 )
 from tests.bridge.tcp.serve_block import block_tissue
+from tissue import TissueError
 
 KEY = bytes(range(32))
 SILENCE = 0.6
@@ -270,3 +274,30 @@ def test_a_request_that_was_sent_in_part_ends_the_link(silent_server):
         for _ in range(100):  # until the system takes no more
             with contextlib.suppress(KeyboardInterrupt):
                 connection.request(MessageKind.COLLIDE, bytes(1 << 19), 0, bytes)
+
+
+# ---- requests that fail --------------------------------------------------------------------------
+
+REASON = "TissueError: the motion became unstable"
+
+
+def fail_twice(server, monkeypatch):
+    """Ask a tissue that fails for what it cannot say, as a new client."""
+
+    def fail():
+        raise TissueError(REASON.partition(": ")[2])
+
+    with contextlib.closing(link_once_free(server.address)) as link:
+        monkeypatch.setattr(server._link, "n_pieces", fail)
+        for _ in range(2):
+            with pytest.raises(LinkError, match=REASON):
+                link.n_pieces()
+
+
+def test_why_requests_fail_is_logged_once_for_each_client(monkeypatch, caplog):
+    with server_in_a_thread() as server:
+        for _ in range(2):
+            fail_twice(server, monkeypatch)
+    errors = [each.getMessage() for each in caplog.records if each.levelname == "ERROR"]
+    assert len(errors) == 2
+    assert all(each.endswith(f" failed: {REASON}") for each in errors)
