@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterable
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from bridge.arithmetic import PLAIN, Six, compiled_arithmetic
 from bridge.collision.broad_phase import BroadPhase
 from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
 from bridge.coupling.coupling import Coupling, CouplingError, expect_plausible_motion
-from bridge.coupling.driven_bodies import DrivenBodies, loads_over
-from bridge.coupling.driving import Driving, PathPart
+from bridge.coupling.driven_bodies import DrivenBodies, DrivenContact, DrivenFrame, loads_over
 from bridge.coupling.limits import DeviceLimits
-from bridge.coupling.local_model import MAX_FRAMES_PER_ANSWER, ImpulseCompensation, LocalModel
+from bridge.coupling.local_model import MAX_FRAMES_PER_ANSWER, Prediction
 from bridge.coupling.passivity import Travel
-from bridge.coupling.query import Query, TimedSweep, TissueAnswer
-from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
+from bridge.coupling.query import PathPart, Query, TissueAnswer, sweeps_along, with_bodies
+from bridge.coupling.virtual_coupling import VirtualCoupling
+from bridge.driven import FrameAttachment, FrameLoad, FrameTie, GeomPoses, plain_region
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink, TissueLink, link_to
-from bridge.poses import Pose, checked_pose, pose_of, six
-from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
+from bridge.poses import Pose, checked_pose, finite
+from tissue import BladeSegment, BladeSweep, Geom, Snapshot, StepResult, Wrench
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
     from tissue import Tissue
 
 
-class Bridge(Driving):
+class Bridge:
     """Carries the blade's motion to the tissue and the tissue's wrench back.
 
     By default the tissue is queried in each frame, and the arm feels in the next one the wrench
@@ -92,11 +93,7 @@ class Bridge(Driving):
         self._link = link
         self._query = Query(link, waits)
         self._driven = DrivenBodies(link)
-        self._model = LocalModel(tissue_yields=coupling is None)
-        self._impulse = ImpulseCompensation()
-        self._correction = np.zeros(6)
-        self._virtual = coupling
-        self._proxy: Proxy | None = None
+        self._prediction = Prediction(coupling)
         self._tissue_every = tissue_every
         # With an answer in each frame the model has nothing to add to the answer itself.
         self._is_direct = waits and tissue_every == 1 and coupling is None
@@ -156,6 +153,121 @@ class Bridge(Driving):
         self._felt = self._frame.numbers_to_world(felt, arm.tip)
         return self._felt
 
+    def attach(
+        self,
+        where: str | npt.ArrayLike,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        breaks_at: float = math.inf,
+        origin: Sequence[float] | None = None,
+    ) -> DrivenFrame:
+        """Attach a frame to tissue, over any link; return the frame, which is moved in each step.
+
+        Args:
+            where: A region as text, a mask of nodes, numbers of nodes, or places in the body at
+                rest [m], as for `tissue.Tissue.attach`; tissue frame.
+            stiffness: Total stiffness of the springs [N/m].
+            damping: Total damping of the springs [N s/m].
+            breaks_at: Force at which the frame releases the tissue [N].
+            origin: Origin of the frame [m], tissue frame; None: the mean of the points.
+
+        Raises:
+            ValueError: see `tissue.Tissue.attach`, where the tissue is in this process.
+            LinkError: the tissue is in another one, and refuses that or did not answer.
+        """
+        self._query.wait()
+        at = None if origin is None else np.asarray(origin, np.float64)
+        frame = self._driven.attach(
+            FrameAttachment(plain_region(where), stiffness, damping, breaks_at, at)
+        )
+        self._path = with_bodies(self._path, frame=frame.pose)
+        return frame
+
+    def tie(
+        self,
+        where: str | npt.ArrayLike,
+        to: npt.ArrayLike,
+        *,
+        stiffness: float,
+        area: float,
+        toughness: float,
+        damping: float = 0.0,
+        rest_length: float | None = None,
+        breaks_at: float = math.inf,
+    ) -> DrivenFrame:
+        """Tie tissue by strands that the blade can cut, over any link; return their frame.
+
+        The strands end at the frame, which rests until it is moved; `n_points` is the number of
+        strands.
+
+        Args:
+            where: Where the strands begin; as for `attach`.
+            to: Where the strands end [m], tissue frame, shape (3,), or one place for each, (n, 3).
+            stiffness: Total stiffness of the strands along them [N/m].
+            area: Total cross-section of the strands [m2].
+            toughness: Energy of cutting a strand [J/m2].
+            damping: Total damping of the strands along them [N s/m].
+            rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
+            breaks_at: Total force of the strands at which they break [N].
+
+        Raises:
+            ValueError: see `tissue.Tissue.tie`, where the tissue is in this process.
+            LinkError: the tissue is in another one, and refuses that or did not answer.
+        """
+        self._query.wait()
+        ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where strands end")
+        of_strands = (stiffness, area, toughness, damping, rest_length, breaks_at)
+        frame = self._driven.tie(FrameTie(plain_region(where), ends, *of_strands))
+        self._path = with_bodies(self._path, frame=frame.pose)
+        return frame
+
+    def release(self, frame: DrivenFrame) -> None:
+        """Release what a frame is attached to; again it does nothing.
+
+        Raises:
+            ValueError: it is none of this bridge.
+            LinkError: the tissue is in another process, and did not answer.
+        """
+        self._query.wait()
+        self._driven.release(frame)
+
+    def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> DrivenContact:
+        """Replace the rigid geoms that the tissue touches, over any link; return the contact.
+
+        The contact is moved in each step. What the tissue's own scene had it touch, such as a
+        table, must be among the geoms.
+
+        Args:
+            geoms: What the tissue can touch from now on.
+            poses: Where they are; tissue frame.
+
+        Raises:
+            ValueError: see `tissue.Tissue.collide_with`, where the tissue is in this process.
+            LinkError: the tissue is in another one, and refuses that or did not answer.
+        """
+        self._query.wait()
+        contact = self._driven.collide_with(geoms, poses, answer_is_due=self._query.is_pending)
+        self._path = with_bodies(self._path, geoms=contact.poses)
+        return contact
+
+    def snapshot(self) -> Snapshot:
+        """Return the whole state of the tissue, after its last answer; tissue frame.
+
+        Raises:
+            LinkError: the tissue is in another process, and did not answer.
+        """
+        self._query.wait()
+        return self._link.snapshot()
+
+    @property
+    def frame_loads(self) -> Sequence[FrameLoad]:
+        """Load on each frame that acts on the tissue, in its last answer; tissue frame.
+
+        First come those of the tissue's own scene, then the driven ones.
+        """
+        return self._driven.loads
+
     @property
     def frame(self) -> TissueFrame:
         """Pose of the tissue in the world."""
@@ -172,14 +284,6 @@ class Bridge(Driving):
         return self._answered
 
     @property
-    def missing_impulse(self) -> FloatArray:
-        """Impulse of the tissue that the arm has not felt yet [N s], tissue frame, shape (3,).
-
-        Zero where the tissue is queried in each frame: the arm feels exactly the tissue's impulse.
-        """
-        return self._impulse.missing[:3]
-
-    @property
     def wrench_raw(self) -> Wrench:
         """The tissue's last wrench before any limit, in the world."""
         if self._raw_is_felt or self._arm is None:
@@ -194,21 +298,8 @@ class Bridge(Driving):
     @property
     def counters(self) -> Counters:
         """Counts of frames, answers and limits since the start."""
-        coupling = self._coupling
-        return Counters(
-            self._n_frames,
-            self._n_answers,
-            self._n_rejected,
-            coupling.n_force_limited,
-            coupling.n_torque_limited,
-            coupling.n_slew_limited,
-            coupling.n_not_finite,
-            coupling.n_implausible,
-            coupling.n_silent,
-            coupling.n_faded,
-            coupling.passivity,
-            self._impulse.written_off,
-        )
+        of_tissue = (self._n_frames, self._n_answers, self._n_rejected)
+        return Counters.of(*of_tissue, self._coupling, self._prediction.impulse_written_off)
 
     def _advance(self, arm: Pose, dt: float) -> Six:
         """Advance the tissue by this frame, where it answers in each, and return its wrench."""
@@ -227,14 +318,11 @@ class Bridge(Driving):
         self._path.clear()
         self._take(result, dt)
         self._answered = True
-        # The wrench is zero, and about no particular point, when no blade is near.
-        fx, fy, fz, tx, ty, tz, _, _, _ = result.wrench.numbers
-        return fx, fy, fz, tx, ty, tz
+        return _about_tip(result)
 
     def _consult(self, arm: Pose, dt: float) -> Six:
         """Query the tissue where that is due, and return its wrench, or what it may be by now."""
-        balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
-        blade = arm if self._proxy is None else pose_of(self._proxy.pose)
+        blade, balanced = self._prediction.follow(arm, dt)
         self._path.append(PathPart(blade, dt, self._driven.poses))
         query = self._query
         is_due = self._queried_at is None or len(self._path) >= self._tissue_every
@@ -247,53 +335,20 @@ class Bridge(Driving):
         self._silence = self._silence + dt if query.is_pending else 0.0
         raw = self._wrench_on(arm, dt) if balanced is None else balanced
         if not self._is_direct:
-            self._impulse.record_felt(np.array(raw) - self._correction, blade.segment, dt)
+            self._prediction.record_felt(raw, blade.segment, dt)
         return raw
 
-    def _follow(self, coupling: VirtualCoupling, arm: Pose, dt: float) -> Six:
-        """Move the proxy after the arm, and return the tissue's wrench on both."""
-        if self._proxy is None:
-            self._proxy = Proxy(coupling, dt, arm.segment)
-        proxy, model = self._proxy, self._model
-        wrench = model.wrench(proxy.pose)
-        self._correction = self._impulse.correction(wrench, proxy.pose, dt)
-        return six(proxy.follow(arm.segment, wrench + self._correction, model.stiffness, dt))
-
     def _start_query(self) -> None:
-        """Query the tissue to advance to the present, while the blade moves along its path.
-
-        A blade that already holds tissue moves on a straight line, except in the last frame: the
-        wrench at one instant is noise, and the mean over a frame is felt. A blade that does not
-        hold tissue may run into it: it moves as the arm did, frame by frame, or the tissue would
-        find it deep inside.
-        """
-        path = self._path
-        blade, engaged = path[-1].blade, self._engaged()
-        before = self._queried_at or blade
-        overlaps = self._broad_phase.overlaps
-        if len(path) == 1:
-            seconds = path[0].seconds
-            touches, self._touching = overlaps(before, blade, seconds, engaged=engaged)
-            sweep = BladeSweep(before.segment, blade.segment) if touches else None
-            parts = [TimedSweep(sweep, seconds, path[0].driven)]
-        else:
-            seconds = sum(part.seconds for part in path)
-            if self._is_anchored_as_before and len(path) > 2:
-                path = [path[-2]._replace(seconds=seconds - path[-1].seconds), path[-1]]
-            pairs = list(pairwise([before, *(part.blade for part in path)]))
-            found = [overlaps(*pair, seconds, engaged=engaged) for pair in pairs]
-            self._touching = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
-            touches = any(one.tissue for one in found)
-            parts = [
-                TimedSweep(BladeSweep(t0.segment, t1.segment), part.seconds, part.driven)
-                for (t0, t1), part in zip(pairs, path, strict=True)
-            ]
-            if not touches:
-                parts = [TimedSweep(None, seconds, path[-1].driven)]
-        self._n_rejected += not touches
-        self._query.start(parts, blade.segment)
+        """Query the tissue to advance to the present, while the blade moves along its path."""
+        blade = self._path[-1].blade
+        overlaps = functools.partial(self._broad_phase.overlaps, engaged=self._engaged())
+        straight = self._is_anchored_as_before and len(self._path) > 2
+        found = sweeps_along(self._path, self._queried_at or blade, overlaps, straight=straight)
+        self._touching = found.fixtures
+        self._n_rejected += not found.touches
+        self._query.start(found.parts, blade.segment)
         if not self._is_direct:
-            self._impulse.end_period()
+            self._prediction.end_period()
         self._queried_at, self._path = blade, []
 
     def _process(self, answer: TissueAnswer) -> None:
@@ -302,9 +357,7 @@ class Bridge(Driving):
         self._driven.take(answer.loads, result)
         self._take(result, answer.seconds)
         if not self._is_direct:
-            self._model.update(result, answer.last_wrench, answer.middle_pose)
-            in_contact = self._model.in_contact
-            self._impulse.compare(result.wrench, answer.seconds, in_contact=in_contact)
+            self._prediction.update(answer)
 
     def _take(self, result: StepResult, seconds: float) -> None:
         """Take a result of a step of `seconds` [s]; update the broad phase.
@@ -324,14 +377,19 @@ class Bridge(Driving):
     def _wrench_on(self, arm: Pose, dt: float) -> Six:
         """Return the tissue's wrench on a blade without a proxy, about its tip."""
         if self._is_direct and self._result is not None:
-            # The wrench is zero, and about no particular point, when no blade is near.
-            fx, fy, fz, tx, ty, tz, _, _, _ = self._result.wrench.numbers
-            return fx, fy, fz, tx, ty, tz
-        wrench = self._model.wrench(arm.segment)
-        self._correction = self._impulse.correction(wrench, arm.segment, dt)
-        return six(wrench + self._correction)
+            return _about_tip(self._result)
+        return self._prediction.wrench_on(arm.segment, dt)
 
     def _engaged(self) -> bool:
         """Return whether the blade holds tissue, which it may drag out of any box."""
         result = self._result
         return result is not None and (result.anchored_length > 0.0 or result.n_active > 0)
+
+
+def _about_tip(result: StepResult) -> Six:
+    """Return force [N] and torque about the tip [N m] of a result.
+
+    They are zero, and about no particular point, when no blade is near.
+    """
+    fx, fy, fz, tx, ty, tz, _, _, _ = result.wrench.numbers
+    return fx, fy, fz, tx, ty, tz

@@ -1,7 +1,8 @@
 """The counters of a bridge: frames, answers, and every change of the tissue's wrench."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
+from bridge.coupling.coupling import Coupling
 from bridge.coupling.passivity import PassivityCounters
 
 
@@ -33,6 +34,34 @@ class Counters(NamedTuple):
     impulse_written_off: float
     """Impulse of the tissue that the arm had not felt when contacts ended [N s]; zero where the
     tissue is queried in each frame. See `ImpulseCompensation`."""
+
+    @classmethod
+    def of(
+        cls, frames: int, answers: int, rejected: int, coupling: Coupling, written_off: float
+    ) -> Self:
+        """Return the counts of a bridge and of its coupling.
+
+        Args:
+            frames: Calls of `Bridge.step`.
+            answers: Answers of the tissue.
+            rejected: Queries in which the blade could not touch the tissue.
+            coupling: Coupling of the bridge, which counts its changes of the wrench.
+            written_off: Impulse that was written off [N s].
+        """
+        return cls(
+            frames,
+            answers,
+            rejected,
+            coupling.n_force_limited,
+            coupling.n_torque_limited,
+            coupling.n_slew_limited,
+            coupling.n_not_finite,
+            coupling.n_implausible,
+            coupling.n_silent,
+            coupling.n_faded,
+            coupling.passivity,
+            written_off,
+        )
 
     def as_numbers(self) -> dict[str, Any]:
         """Return the counts by name, for a report."""

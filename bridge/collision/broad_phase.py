@@ -23,7 +23,7 @@ from bridge.poses import Pose
 from tissue import BladeShape, BladeSweep, Chunks, FloatArray, IntArray
 
 
-class _Overlaps(NamedTuple):
+class Overlaps(NamedTuple):
     """What the swept box of the blade overlaps."""
 
     tissue: bool
@@ -86,7 +86,7 @@ class BroadPhase:
         self._has_fixtures = bool(obstacles)
         self._fixtures = Obstacles(obstacles)
 
-    def overlaps(self, before: Pose, after: Pose, dt: float, *, engaged: bool = False) -> _Overlaps:
+    def overlaps(self, before: Pose, after: Pose, dt: float, *, engaged: bool = False) -> Overlaps:
         """Return what the blade can touch while it moves.
 
         Args:
@@ -98,7 +98,7 @@ class BroadPhase:
         if self._has_fixtures:
             self._blade.place(self._swept(before, after))
             fixtures = self._fixtures.colliding_with(self._blade.object)
-            return _Overlaps(engaged or self._reaches_tissue(before, after, dt), fixtures)
+            return Overlaps(engaged or self._reaches_tissue(before, after, dt), fixtures)
         touches = engaged or self._reaches_tissue(before, after, dt)
         return _ONLY_TISSUE if touches else _NOTHING
 
@@ -166,7 +166,7 @@ class BroadPhase:
 
 
 _WORLD_AXES = np.eye(3)
-_ONLY_TISSUE, _NOTHING = _Overlaps(True, ()), _Overlaps(False, ())
+_ONLY_TISSUE, _NOTHING = Overlaps(True, ()), Overlaps(False, ())
 
 
 def _inflated(box: SweptBox, distance: float) -> SweptBox:

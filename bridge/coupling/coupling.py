@@ -10,7 +10,6 @@ from bridge.arithmetic import PLAIN, Arithmetic, Six, Triple
 from bridge.coupling.limits import DeviceLimits, factor_to_limit
 from bridge.coupling.passivity import Passivity, PassivityCounters, Travel
 from bridge.poses import six
-from tissue import Wrench
 
 _log = logging.getLogger(__name__)
 
@@ -50,8 +49,6 @@ RAMP = 0.1
 takes about as long to react; a wrench that returned at once would throw it."""
 
 _NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-_AT_REST = Travel((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
 
 
 class CouplingError(RuntimeError):
@@ -95,27 +92,8 @@ class Coupling:
         self.n_not_finite = 0
         self.n_implausible = 0
 
-    def render(
-        self, wrench: Wrench, dt: float, travel: Travel = _AT_REST, silence: float = 0.0
-    ) -> Wrench:
-        """Return the wrench that the arm feels for the next `dt` [s].
-
-        Args:
-            wrench: Wrench of the tissue on the blade, about the tip.
-            dt: Length of the frame [s].
-            travel: Motion and work of the blade since the last frame, in the frame of the wrench.
-            silence: How long the arm has waited for the tissue by now [s].
-
-        Raises:
-            CouplingError: the wrench is not finite, or was implausible for too long.
-        """
-        fx, fy, fz = wrench.force.tolist()
-        tx, ty, tz = wrench.torque.tolist()
-        felt = self.felt((fx, fy, fz, tx, ty, tz), wrench.point.tolist(), dt, travel, silence)
-        return Wrench(np.array(felt[:3]), np.array(felt[3:]), wrench.point)
-
     def felt(self, wrench: Six, point: Triple, dt: float, travel: Travel, silence: float) -> Six:
-        """Return what `render` does in plain numbers; the same object where nothing is changed.
+        """Return force and torque that the arm feels for the next `dt` [s]; unchanged: `wrench`.
 
         Args:
             wrench: Wrench of the tissue on the blade, about the tip: force [N] and torque [N m].
@@ -123,6 +101,9 @@ class Coupling:
             dt: Length of the frame [s].
             travel: Motion and work of the blade since the last frame, in the frame of the wrench.
             silence: How long the arm has waited for the tissue by now [s].
+
+        Raises:
+            CouplingError: the wrench is not finite, or was implausible for too long.
         """
         fx, fy, fz, tx, ty, tz = wrench
         force_size, torque_size = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)

@@ -6,9 +6,12 @@ and Tendick 2000).
 
 import numpy as np
 
+from bridge.arithmetic import Six
 from bridge.coupling.limits import factor_to_limit, magnitude
+from bridge.coupling.query import TissueAnswer
+from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import wrench_about
-from bridge.poses import half_length, motion
+from bridge.poses import Pose, half_length, motion, pose_of, six
 from tissue import BladeSegment, FloatArray, RigidContacts, StepResult, Wrench
 
 MAX_FRAMES_PER_ANSWER = 100
@@ -22,6 +25,65 @@ notice, and above the changes by tissue that oscillates while the blade rests.""
 _ORIGIN = np.zeros(3)
 
 _NO_STIFFNESS = np.zeros((6, 6))
+
+
+class Prediction:
+    """The tissue's wrench between two of its answers, and what it makes good of the last one.
+
+    Args:
+        coupling: Coupling between the arm's blade and the one that cuts; None where they are one.
+    """
+
+    def __init__(self, coupling: VirtualCoupling | None) -> None:
+        self._model = LocalModel(tissue_yields=coupling is None)
+        self._impulse = ImpulseCompensation()
+        self._correction = np.zeros(6)
+        self._coupling = coupling
+        self._proxy: Proxy | None = None
+
+    @property
+    def impulse_written_off(self) -> float:
+        """Sum of the impulses that were missing when contacts ended [N s]."""
+        return self._impulse.written_off
+
+    def follow(self, arm: Pose, dt: float) -> tuple[Pose, Six | None]:
+        """Move the proxy after the arm for `dt` [s], where there is one.
+
+        Returns:
+            Pose of the blade that cuts, and the tissue's wrench on it and on the arm's blade; None
+            where they are one.
+        """
+        if self._coupling is None:
+            return arm, None
+        if self._proxy is None:
+            self._proxy = Proxy(self._coupling, dt, arm.segment)
+        wrench = self._corrected(self._proxy.pose, dt)
+        balanced = self._proxy.follow(arm.segment, wrench, self._model.stiffness, dt)
+        return pose_of(self._proxy.pose), six(balanced)
+
+    def wrench_on(self, blade: BladeSegment, dt: float) -> Six:
+        """Return force [N] and torque about the tip [N m] on a blade for the next `dt` [s]."""
+        return six(self._corrected(blade, dt))
+
+    def record_felt(self, felt: Six, blade: BladeSegment, dt: float) -> None:
+        """Count what the arm feels for `dt` [s], correction included."""
+        self._impulse.record_felt(np.array(felt) - self._correction, blade, dt)
+
+    def end_period(self) -> None:
+        """Begin a new period. The tissue is queried about the one that ends."""
+        self._impulse.end_period()
+
+    def update(self, answer: TissueAnswer) -> None:
+        """Take an answer of the tissue."""
+        self._model.update(answer.result, answer.last_wrench, answer.middle_pose)
+        in_contact = self._model.in_contact
+        self._impulse.compare(answer.result.wrench, answer.seconds, in_contact=in_contact)
+
+    def _corrected(self, blade: BladeSegment, dt: float) -> FloatArray:
+        """Return the wrench by the model on a blade with the correction, shape (6,)."""
+        wrench = self._model.wrench(blade)
+        self._correction = self._impulse.correction(wrench, blade, dt)
+        return wrench + self._correction
 
 
 class LocalModel:

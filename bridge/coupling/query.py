@@ -1,15 +1,17 @@
 """A query to the tissue and its answer, waited for or taken when it is there."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from bridge.collision.broad_phase import Overlaps
 from bridge.coupling.driven_bodies import DrivenLoads, DrivenPoses, loads_over, mean_loads
-from bridge.driven import mean_wrench
+from bridge.driven import FramePose, GeomPoses, mean_wrench
 from bridge.link import TissueLink
-from bridge.poses import motion, moved
+from bridge.poses import Pose, motion, moved
 from tissue import BladeSegment, BladeSweep, StageTimes, StepResult, Wrench
 
 _LONGEST_STEP = 0.5
@@ -26,6 +28,28 @@ class TimedSweep(NamedTuple):
     """Duration [s]."""
     driven: DrivenPoses = DrivenPoses()
     """Poses of the driven frames and geoms at its end."""
+
+
+class PathPart(NamedTuple):
+    """A part of the path that the tissue has not done yet."""
+
+    blade: Pose
+    """Pose of the blade at its end."""
+    seconds: float
+    """Duration [s]."""
+    driven: DrivenPoses
+    """Poses of the driven frames and geoms at its end."""
+
+
+class SweepsAlong(NamedTuple):
+    """A path as the tissue is to do it."""
+
+    parts: list[TimedSweep]
+    """Parts of a query."""
+    touches: bool
+    """Whether the blade may touch tissue."""
+    fixtures: tuple[str, ...]
+    """Names of the fixtures that it touches."""
 
 
 class TissueAnswer(NamedTuple):
@@ -134,6 +158,58 @@ class Query:
             last_sweep,
             mean_loads(parts, [part.driven for part in path], seconds),
         )
+
+
+def with_bodies(
+    path: Sequence[PathPart], *, frame: FramePose | None = None, geoms: GeomPoses | None = None
+) -> list[PathPart]:
+    """Return a path with a new frame, or with other geoms, which are at rest."""
+    found = []
+    for part in path:
+        frames = part.driven.frames if frame is None else (*part.driven.frames, frame)
+        driven = DrivenPoses(frames, part.driven.geoms if geoms is None else geoms)
+        found.append(part._replace(driven=driven))
+    return found
+
+
+def sweeps_along(
+    path: Sequence[PathPart],
+    before: Pose,
+    overlaps: Callable[[Pose, Pose, float], Overlaps],
+    *,
+    straight: bool,
+) -> SweepsAlong:
+    """Return the motions of the blade along a path.
+
+    A blade that already holds tissue moves on a straight line, except in the last frame: the
+    wrench at one instant is noise, and the mean over a frame is felt. A blade that does not
+    hold tissue may run into it: it moves as the arm did, frame by frame, or the tissue would
+    find it deep inside.
+
+    Args:
+        path: The path.
+        before: Pose of the blade at its start.
+        overlaps: The broad phase, of two poses and the duration between them [s].
+        straight: Whether the blade holds tissue.
+    """
+    if len(path) == 1:
+        (blade, seconds, driven) = path[0]
+        touches, fixtures = overlaps(before, blade, seconds)
+        sweep = BladeSweep(before.segment, blade.segment) if touches else None
+        return SweepsAlong([TimedSweep(sweep, seconds, driven)], touches, fixtures)
+    seconds = sum(part.seconds for part in path)
+    if straight:
+        path = [path[-2]._replace(seconds=seconds - path[-1].seconds), path[-1]]
+    pairs = list(pairwise([before, *(part.blade for part in path)]))
+    found = [overlaps(*pair, seconds) for pair in pairs]
+    fixtures = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
+    if not any(one.tissue for one in found):
+        return SweepsAlong([TimedSweep(None, seconds, path[-1].driven)], False, fixtures)
+    parts = [
+        TimedSweep(BladeSweep(t0.segment, t1.segment), part.seconds, part.driven)
+        for (t0, t1), part in zip(pairs, path, strict=True)
+    ]
+    return SweepsAlong(parts, True, fixtures)
 
 
 def _combined(results: Sequence[StepResult], seconds: Sequence[float]) -> StepResult:
