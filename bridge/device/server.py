@@ -40,7 +40,7 @@ class DrivenBlade(Protocol):
             ValueError: the device cannot have moved so.
         """
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Release the blade, which rests where it is."""
 
     def lose_client(self) -> None:
@@ -109,7 +109,7 @@ class DeviceServer(SingleClientServer):
     def _note_refusal(self, peer: Peer, error: MessageError) -> None:
         """Release the blade; log the first of refusals in a row, of which there may be many."""
         self._n_dropped += 1
-        self._driven.let_go()
+        self._driven.release()
         if not self._is_refusing:
             super()._note_refusal(peer, error)
         self._is_refusing = True

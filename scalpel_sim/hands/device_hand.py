@@ -69,7 +69,7 @@ class DeviceHand(Teleoperation):
         """
         before = self._stylus
         if not holds or self.ended_at is not None:
-            return self.let_go()
+            return self.release()
         self._heard_at = self._clock()
         if before is None:
             self._stylus, self.is_engaged = pose, True
@@ -77,7 +77,7 @@ class DeviceHand(Teleoperation):
         move, turn = pose.position - before.position, _turn_between(before, pose)
         distance, angle = math.hypot(*move.tolist()), math.hypot(*turn.tolist())
         if not (distance <= FARTHEST_MOVE and angle <= FARTHEST_TURN):
-            self.let_go()
+            self.release()
             raise ValueError(
                 f"the stylus has jumped by {distance:.3g} m and {angle:.3g} rad; at most "
                 f"{FARTHEST_MOVE:g} m and {FARTHEST_TURN:.3g} rad are allowed from one pose to the "
@@ -87,15 +87,15 @@ class DeviceHand(Teleoperation):
         self._want(move, turn)
         return None
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Rest where it is; the next pose engages it again, from where both are then."""
         self._stylus = None
-        super().let_go()
+        super().release()
 
     def lose_client(self) -> None:
         """Release the blade, as the device has gone."""
         has_led = self._heard_at > -math.inf
-        self.let_go()
+        self.release()
         self._is_to_end |= self._ends_with_client and has_led
 
     def end(self) -> None:
@@ -123,7 +123,7 @@ class DeviceHand(Teleoperation):
         self._is_to_end |= any(isinstance(command, End) for command in self.commands)
         self.commands.clear()  # a page may end the stroke, and leads nothing
         if self.is_engaged and self._clock() - self._heard_at > self._watchdog:
-            self.let_go()
+            self.release()
             self._is_to_end |= self._ends_with_client
         return self._is_to_end
 

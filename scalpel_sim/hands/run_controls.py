@@ -232,7 +232,7 @@ class RunControls:
                 self._begin_stroke()
             self._pass_on(command)
         elif isinstance(command, Pause | Resume):
-            self._let_go()
+            self._release()
             self.is_paused, self._frames_left = isinstance(command, Pause), 0
             self.on_change()
         elif isinstance(command, Step):
@@ -274,12 +274,12 @@ class RunControls:
                 self.history.drop()  # nothing was led since
         if self.history.reset() if to_start else self.history.undo():
             self._frames_left, self._is_stepping = 0, False
-        self._let_go()  # it may have led at the moment to which it went back
+        self._release()  # it may have led at the moment to which it went back
         self._numbers_before_stroke = None
         self.on_change()
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         """Release the instrument, and forget the commands that are left."""
         if self.hand is not None:
             self.hand.commands.clear()
-            self.hand.let_go()
+            self.hand.release()

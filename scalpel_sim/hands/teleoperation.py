@@ -105,17 +105,17 @@ class Teleoperation(abc.ABC):
         """End at time `t` [s], after the last frame, unless it has ended before."""
         if self.ended_at is None:
             self.ended_at = t
-            self.let_go()
+            self.release()
             for instrument in self.instruments:
                 instrument.finish(t)
 
     def choose(self, instrument: int) -> None:
         """Release the instrument, and lead the one of that number from now on, if there is one."""
-        self.let_go()
+        self.release()
         if instrument < len(self.instruments):
             self.chosen = instrument
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Release the chosen instrument: it rests where it is."""
         self.is_engaged = False
         self.instruments[self.chosen].pose.rest()
@@ -158,7 +158,7 @@ class LiveHand(Teleoperation):
             elif isinstance(command, Engage):
                 self.is_engaged = True
             elif isinstance(command, Release):
-                self.let_go()
+                self.release()
             elif isinstance(command, Choose):
                 self.choose(command.instrument)
             elif isinstance(command, Jaws):
@@ -166,5 +166,5 @@ class LiveHand(Teleoperation):
             elif isinstance(command, End):
                 has_ended = True
         if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
-            self.let_go()
+            self.release()
         return has_ended

@@ -308,7 +308,7 @@ class CheckedBlade:
         assert (np.abs(pose.position) <= 1000.0).all()
         assert abs(np.linalg.norm(pose.orientation) - 1.0) < 1e-9
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Nothing is held here."""
 
     def lose_client(self) -> None:

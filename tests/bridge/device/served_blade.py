@@ -33,8 +33,8 @@ class NotedBlade:
         if pose.position[0] > 1.0:
             raise ValueError("the stylus has jumped")
 
-    def let_go(self):
-        self.asked.append(("let_go",))
+    def release(self):
+        self.asked.append(("release",))
 
     def lose_client(self):
         self.asked.append(("lose_client",))

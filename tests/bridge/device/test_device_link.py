@@ -83,7 +83,7 @@ def test_a_refused_pose_lets_go_and_the_link_stays_open(served, wrong):
     with DeviceClient(address) as client:
         with pytest.raises(LinkError, match="refused"):
             client.servo_cp(np.array([wrong, 0.0, 0.0]), UNTURNED)
-        assert blade.asked[-1] == ("let_go",)
+        assert blade.asked[-1] == ("release",)
         assert client.servo_cp(ORIGIN, UNTURNED).n_dropped == 1
         assert blade.asked[-1][0] == "servo_cp"
 
