@@ -373,12 +373,3 @@ def test_an_invalid_pose_is_refused_before_it_reaches_the_tissue(block_tissue, s
 def test_a_frame_that_lasts_no_time_is_refused(block_tissue, upright, dt):
     with pytest.raises(ValueError, match="must be positive and finite"):
         Bridge(InProcessLink(block_tissue())).step(upright(0.0, 0.0), dt)
-
-
-def test_the_link_describes_the_tissue_for_the_side_of_the_arm(block_tissue):
-    tissue = block_tissue()
-    described = InProcessLink(tissue, "block").describe()
-    assert described.scene == "block"
-    assert (described.n_tetrahedra, described.n_nodes) == (72, 36)
-    assert described.material == tissue.material
-    np.testing.assert_allclose(described.bounds, [[0.0] * 3, [0.02] * 3])

@@ -25,19 +25,6 @@ def pose(i):
     return FramePose(np.array([0.01, 0.01, 0.02 + 2e-5 * i]), turned)
 
 
-def test_a_driven_frame_acts_as_the_attachment_that_it_is():
-    led, moved = InProcessLink(cube()), cube()
-    number = led.attach(FrameAttachment("top", 200.0, 2.0))
-    attachment = moved.attach("top", stiffness=200.0, damping=2.0)
-    assert number == 0 and led.loads()[0].n_points == 9
-    for i in range(1, 30):
-        led.step(None, DT, [pose(i)])
-        attachment.move(*pose(i))
-        moved.step(None, DT)
-        assert bits(tuple(led.loads()[0].wrench)) == bits(tuple(attachment.wrench))
-    assert np.linalg.norm(attachment.wrench.force) > 0.01
-
-
 def test_frames_of_the_tissue_s_own_come_first_and_take_no_poses():
     tissue = cube()
     own = tissue.attach([[0.0, 0.0, 0.02]], stiffness=10.0)

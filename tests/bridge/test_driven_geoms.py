@@ -23,19 +23,6 @@ def places(i):
     return GeomPoses(np.array([[0.01, 0.01, 0.0241 - 2e-5 * i], [0.0, 0.0, -1e-4]]), turned)
 
 
-def test_driven_geoms_act_as_those_that_the_tissue_itself_touches():
-    led, touched = InProcessLink(cube()), cube()
-    led.collide_with(BOTH, places(0))
-    contact = touched.collide_with(BOTH, *places(0))
-    for i in range(1, 60):
-        result = led.step(None, DT, (), places(i))
-        contact.move(*places(i))
-        touched.step(None, DT)
-        assert bits(tuple(led.geom_loads())) == bits(contact.wrenches())
-    assert led.geom_loads().forces[0, 2] > 0.01
-    assert set(result.contacts.geom) == {0}
-
-
 def test_what_a_geom_feels_and_what_the_tissue_feels_sum_to_zero():
     link = InProcessLink(cube())
     link.collide_with(BOTH, places(0))
@@ -69,15 +56,15 @@ def test_other_geoms_take_the_place_of_those_before():
 def test_a_bridge_s_geoms_feel_what_those_of_the_tissue_feel():
     tissue, beside = cube(), cube()
     bridge = Bridge(tissue)
-    led, contact = bridge.collide_with(BOTH, places(0)), beside.collide_with(BOTH, *places(0))
-    assert len(led.forces().geom) == 0
+    driven, contact = bridge.collide_with(BOTH, places(0)), beside.collide_with(BOTH, *places(0))
+    assert len(driven.forces().geom) == 0
     for i in range(1, 60):
-        led.move(places(i))
+        driven.move(places(i))
         contact.move(*places(i))
         bridge.step(FAR, DT)
         beside.step(None, DT)
-        assert bits(tuple(led.loads)) == bits(contact.wrenches())
-    there, here = contact.forces(), led.forces()
+        assert bits(tuple(driven.loads)) == bits(contact.wrenches())
+    there, here = contact.forces(), driven.forces()
     assert len(there.geom) > 0 and bits((there.geom, there.point)) == bits((here.geom, here.point))
     assert here.normal == pytest.approx(there.normal)
     assert here.force == pytest.approx(there.force, abs=1e-12)
@@ -90,11 +77,11 @@ def test_where_the_tissue_is_queried_seldom_the_geoms_go_as_they_were_driven(cha
     bridge = Bridge(tissue, **changes)
     bridge.step(FAR, DT)
     bridge.step(FAR, DT)
-    led = bridge.collide_with(BOTH, places(0))
+    driven = bridge.collide_with(BOTH, places(0))
     for i in range(1, 80):
-        led.move(places(min(i, 50)))
+        driven.move(places(min(i, 50)))
         bridge.step(FAR, DT)
-    assert led.loads.forces[0, 2] > 0.01
+    assert driven.loads.forces[0, 2] > 0.01
     deepest = tissue.snapshot().positions[fixed_nodes(CUBE, "top"), 2].min()
     assert deepest == pytest.approx(0.0241 - 50 * 2e-5 - 0.004, abs=1e-4)
 
@@ -103,14 +90,14 @@ def test_what_is_made_while_an_answer_is_due_takes_the_next_one():
     """An arm that does not wait attaches and touches while the tissue is busy."""
     bridge = Bridge(cube(), waits=False)
     bridge.step(FAR, DT)
-    led = bridge.collide_with(BOTH, places(0))
+    driven = bridge.collide_with(BOTH, places(0))
     grip = bridge.attach([[0.0, 0.0, 0.02]], stiffness=50.0)
     for i in range(1, 60):
-        led.move(places(i))
+        driven.move(places(i))
         grip.move([0.0, 0.0, 0.02 + 1e-5 * i])
         bridge.step(FAR, DT)
         time.sleep(2e-3)
-    assert led.loads.forces[0, 2] > 0.01
+    assert driven.loads.forces[0, 2] > 0.01
     assert grip.n_points == 1 and grip.wrench.force[2] < 0.0
 
 
@@ -125,10 +112,10 @@ def test_what_is_made_while_an_answer_is_due_takes_the_next_one():
 )
 def test_a_pose_that_is_none_is_refused_before_the_tissue_moves(origins, rotations, expected):
     at_first = GeomPoses(np.array([[0.01, 0.01, 0.03]]), np.eye(3)[None])
-    led = Bridge(cube()).collide_with([BALL], at_first)
+    driven = Bridge(cube()).collide_with([BALL], at_first)
     with pytest.raises(ValueError, match=expected):
-        led.move(GeomPoses(np.array(origins), np.array(rotations)))
-    assert bits(led.poses) == bits(at_first)
+        driven.move(GeomPoses(np.array(origins), np.array(rotations)))
+    assert bits(driven.poses) == bits(at_first)
 
 
 def test_mean_loads_are_those_of_the_impulses():

@@ -4,12 +4,11 @@ import contextlib
 import socket
 import threading
 
-import numpy as np
 import pytest
 
 from bridge import LinkError, TcpLink
 from bridge.tcp.address import parse_address
-from bridge.tcp.channel import NONCE_BYTES, Channel, direction_keys, new_nonce
+from bridge.tcp.channel import NONCE_BYTES, TAG_BYTES, Channel, direction_keys, new_nonce
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import unpack_error
 from bridge.tcp.server import TissueServer
@@ -152,26 +151,13 @@ def test_a_step_that_was_changed_in_transit_is_not_executed(server, where):
             "magic": b"SCUX" + step[4:],
             "kind": pack_frame(MessageKind.PIECES, sequence, payload),
             "sequence": pack_frame(kind, sequence + 1, payload),
-            "payload": pack_frame(kind, sequence, pack_step(None, 0.5) + payload[8:]),
+            "payload": pack_frame(kind, sequence, pack_step(None, 0.5) + payload[-TAG_BYTES:]),
             "tag": pack_frame(kind, sequence, payload[:-1] + bytes([payload[-1] ^ 1])),
         }[where]
         peer.sendall(changed)
         refusal = next_frame(peer, channel)
         assert refusal.kind == MessageKind.ERROR
         assert peer.recv(1) == b""
-    assert_serves(server, KEY)
-
-
-def test_no_frame_with_a_random_change_is_executed(server):
-    random = np.random.default_rng(0)
-    for _ in range(50):
-        peer, channel = client_with_key(server.address)
-        with peer:
-            (step,) = channel.pack(MessageKind.STEP, 2, pack_step(None, DT))
-            changed = bytearray(step)
-            changed[random.integers(len(step))] ^= 1 << random.integers(8)
-            peer.sendall(bytes(changed))
-            assert next_frame(peer, channel).kind == MessageKind.ERROR
     assert_serves(server, KEY)
 
 

@@ -3,7 +3,6 @@
 import contextlib
 import threading
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -15,27 +14,12 @@ from bridge.tcp.messages.driven import ATTACHMENT, NUMBER, pack_geoms
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.server import TissueServer
 from bridge.tcp.wire import MessageKind, pack_frame
-from scalpel_sim import Grip
 from tests.bridge.bits import bits
 from tests.bridge.changed_messages import with_number
 from tests.bridge.tcp.bare_sockets import DT, connected_client, link_once_free, read_one
 from tests.bridge.tcp.serve_block import SIDE, block_tissue
-from tests.bridge.test_driven_frames import FAR, pose
+from tests.bridge.test_driven_frames import pose
 from tissue import Geom, RigidContacts
-
-JAW = """
-<mujoco>
-  <option timestep="0.001" gravity="0 0 0"/>
-  <worldbody>
-    <body name="jaw" pos=".01 .01 .03">
-      <joint name="lift" type="slide" axis="0 0 1"/>
-      <geom size=".01" mass=".2"/>
-    </body>
-  </worldbody>
-  <actuator><position joint="lift" kp="500" kv="10"/></actuator>
-</mujoco>
-"""
-
 
 WEDGE = np.array([[-3e-3, 0, 0], [3e-3, 0, 0], [0, 3e-3, 0], [0, -3e-3, 0], [0, 0, 4e-3]])
 STARTS = {
@@ -141,32 +125,6 @@ def test_ties_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
     assert bits(tuple(map(tuple, of_here))) == bits(tuple(map(tuple, of_there)))
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert [of_here[i][0][1] for i in (0, 160, 180)] == [2, 1, 0]
-
-
-def jaw_held(link):
-    """A jaw of MuJoCo that lifts what it holds; its way."""
-    model = mujoco.MjModel.from_xml_string(JAW)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    bridge, way = Bridge(link), []
-    grip = Grip(data, "jaw", bridge, "top", stiffness=200.0, damping=2.0)
-    data.ctrl[0] = 2e-3
-    for _ in range(60):
-        mujoco.mj_step1(model, data)
-        grip.follow()
-        bridge.step(FAR, DT)
-        grip.apply()
-        mujoco.mj_step2(model, data)
-        way.append((data.qpos[0], *data.xfrc_applied[1].tolist()))
-    assert grip.n_points > 0 and grip.wrench.force[2] < -1e-3
-    grip.release()
-    assert grip.n_points == 0
-    np.testing.assert_allclose(data.xfrc_applied[1], 0.0, atol=1e-12)
-    return way
-
-
-def test_a_jaw_of_mujoco_holds_tissue_over_any_link(link):
-    assert bits(tuple(jaw_held(InProcessLink(block_tissue())))) == bits(tuple(jaw_held(link)))
 
 
 def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):

@@ -58,7 +58,7 @@ def test_a_blade_that_moves_as_far_as_is_allowed_is_served(link, upright):
     assert link.step(sweep, DT).cut_area > 0.0
 
 
-def test_a_frame_that_is_led_too_far_is_refused(link):
+def test_a_frame_that_is_driven_too_far_is_refused(link):
     link.attach(FrameAttachment("top", 100.0))
     at = np.array([0.01, 0.01, 0.02])
     near = [FramePose(at, np.eye(3))]
