@@ -25,8 +25,6 @@ FiniteFloat = Annotated[float, msgspec.Meta(ge=-sys.float_info.max, le=sys.float
 MAP_BYTES = 1 << 10
 """Largest length of a message without its arrays and lists [byte]: keys and single numbers."""
 
-_LARGEST_FLAG = 1
-
 
 class Message(Generic[_T]):
     """The content of one kind of message.
@@ -55,7 +53,7 @@ class Message(Generic[_T]):
         """
         try:
             plain = self._decoder.decode(payload)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise MessageError(f"{self._what} cannot be read: {error}") from error
         try:
             value: _T = self._part.value(plain, {})
@@ -116,7 +114,7 @@ class Array:
             n = lengths.setdefault(n, len(plain) // self._row_bytes)
         if len(plain) != n * self._row_bytes:
             raise MessageError(f"{self._what} has {len(plain)} bytes; wanted {n * self._row_bytes}")
-        if self._scalar == np.bool_ and max(plain, default=0) > _LARGEST_FLAG:
+        if self._scalar == np.bool_ and max(plain, default=0) > 1:
             raise MessageError(f"a flag of {self._what} is neither 0 nor 1")
         array: npt.NDArray[Any] = np.ndarray((n, *self._rest), self._stored, plain)
         return array.astype(self._scalar, copy=False)

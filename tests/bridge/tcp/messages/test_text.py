@@ -82,6 +82,13 @@ def test_an_impossible_description_is_refused(change, why):
         DESCRIPTION.unpack(changed(described(), **change))
 
 
+def test_a_description_that_is_nested_too_deep_is_refused():
+    packed = changed(described(), material__x="deep")
+    deep = packed.replace(msgspec.msgpack.encode("deep"), b"\x91" * 100_000 + b"\xc0")
+    with pytest.raises(MessageError, match=r"description cannot be read: .*recursion"):
+        DESCRIPTION.unpack(deep)
+
+
 def test_as_many_views_as_there_may_be_fit():
     longest = SceneView("\U0001f52a" * 40, *[(-1.0 / 3.0e-100,) * 3] * 3, 100.0 / 3.0)
     packed = described(*[longest] * MAX_VIEWS)
