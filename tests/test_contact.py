@@ -268,7 +268,7 @@ def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
         return tissue
 
     ample = run()
-    monkeypatch.setattr("tissue.contact.penalty.penalty_contact.CAPACITY_OF_PAIRS", 4)
+    monkeypatch.setattr("tissue.contact.self_contact.CAPACITY_OF_PAIRS", 4)
     for one, other in zip(ample.snapshot(), run().snapshot(), strict=True):
         np.testing.assert_array_equal(one, other)
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from scalpel_sim.bench.blocks import held_nodes, jittered_block
 from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
-from tissue.contact.penalty.contact_forces import add_contact_forces
-from tissue.contact.penalty.contact_work import end_contact_substep
-from tissue.contact.penalty.penalty_contact import PenaltyContact
+from tissue.contact.response.forces import add_contact_forces, end_contact_substep
+from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 from tissue.elasticity.energy_density import neo_hookean
@@ -147,9 +146,9 @@ class TouchingBlocks:
             self._tissue.step(None, FRAME_DT)
 
     @property
-    def _contact(self) -> PenaltyContact:
+    def _contact(self) -> SelfContact:
         contact = self._tissue._system.contact
-        assert isinstance(contact, PenaltyContact)
+        assert isinstance(contact, SelfContact)
         return contact
 
     @property

@@ -9,7 +9,7 @@ from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
 from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
 from tissue.contact.geoms.geom_contact import no_geoms
-from tissue.contact.penalty.contact_forces import new_penalty_forces
+from tissue.contact.response.contacts import new_penalty_forces
 from tissue.core.thread_team import new_team
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path

@@ -11,14 +11,14 @@ Source: Baraff (1994), Fast contact force computation for nonpenetrating rigid b
 in terms of accelerations.
 """
 
-from tissue.contact.geoms.contact_impulses import (
+from tissue.contact.geoms.geom_arrays import GeomContacts
+from tissue.contact.geoms.kinematic_contact import (
     SWEEPS,
     add_to_nodes,
     mobility_at,
     push,
     weighted,
 )
-from tissue.contact.geoms.geom_arrays import GeomContacts
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point

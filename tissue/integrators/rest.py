@@ -7,8 +7,7 @@ support moves, a load acts or its mesh changes.
 import math
 
 from tissue.blade.anchors import is_engaged
-from tissue.contact.penalty.contact_forces import add_contact_forces
-from tissue.contact.penalty.contact_work import end_contact_substep
+from tissue.contact.response.forces import add_contact_forces, end_contact_substep
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point_of, store_point

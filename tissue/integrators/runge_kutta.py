@@ -18,8 +18,9 @@ every stage, for the full order; by default it acts between the steps
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_blade_forces
-from tissue.contact.geoms.contact_impulses import clear_geom_forces
-from tissue.contact.penalty.contact_forces import add_contact_forces, clear_contact_forces
+from tissue.contact.geoms.kinematic_contact import clear_geom_forces
+from tissue.contact.response.contacts import clear_contact_forces
+from tissue.contact.response.forces import add_contact_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point

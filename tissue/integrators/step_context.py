@@ -5,7 +5,7 @@ from typing import NamedTuple
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import Edge
 from tissue.contact.geoms.geom_arrays import GeomContacts
-from tissue.contact.penalty.contact_forces import PenaltyForces
+from tissue.contact.response.contacts import PenaltyForces
 from tissue.core.structs import Arrays
 from tissue.core.thread_team import Team
 from tissue.elasticity.internal_forces import Elastic, Surroundings

@@ -2,9 +2,8 @@
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_slip
-from tissue.contact.geoms.contact_impulses import clear_geom_forces
-from tissue.contact.geoms.kinematic_contact import end_geom_substep
-from tissue.contact.penalty.contact_work import end_contact_substep
+from tissue.contact.geoms.kinematic_contact import clear_geom_forces, end_geom_substep
+from tissue.contact.response.forces import end_contact_substep
 from tissue.core.jit import kernel
 from tissue.elasticity.collapse import clear_collapse_forces
 from tissue.integrators.attachments import clear_attachment_forces

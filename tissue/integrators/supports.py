@@ -1,6 +1,6 @@
 """Fixed nodes as supports: the force that holds each, and the work of those that move."""
 
-from tissue.contact.geoms.contact_impulses import clear_geom_forces
+from tissue.contact.geoms.kinematic_contact import clear_geom_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times

@@ -13,7 +13,7 @@ from tissue.blade.interaction import BladeInteraction
 from tissue.blade.wrench import BladeReport
 from tissue.blade_shape import BladeShape
 from tissue.contact.geoms.geom_contact import no_geoms
-from tissue.contact.penalty.penalty_contact import PenaltyContact
+from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.core.thread_team import new_team
 from tissue.cut_settings import MeshMeasures
@@ -58,7 +58,7 @@ class System:
         self,
         body: Body,
         elasticity: Elasticity,
-        contact: PenaltyContact,
+        contact: SelfContact,
         interaction: BladeInteraction,
         surroundings: Surroundings,
         visits: Visits,
@@ -287,7 +287,7 @@ def assembled(
     )
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
-    touching = PenaltyContact(
+    touching = SelfContact(
         body,
         node_size,
         material.friction,

@@ -50,7 +50,7 @@ def inputs_of(
         dt,
         loads.forces if loads.act else (),
         tuple([each.way for each in attachments.all]) if attachments.act else (),
-        geoms.way if geoms.geoms else None,
+        geoms.target if geoms.geoms else None,
         body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]] if supports.is_moving else None,
     )
 
@@ -63,7 +63,7 @@ def give_inputs(
     for each, way in zip(attachments.all, inputs.frames, strict=True):
         each.way = way
     if inputs.geoms is not None:
-        system.geoms.way = inputs.geoms
+        system.geoms.target = inputs.geoms
     is_moving = inputs.supports is not None
     if is_moving or system.supports.is_moving:
         body = system.body

@@ -17,17 +17,20 @@ SCRATCH = frozenset(
         "HashTable",
         # Without lips, which are there within a pass alone, all entries are 0.
         "FlowGraph",
-        # Made anew by each update of the pairs, or look for folds, before it is read.
+        # Made by each update of the pairs, or search for self-proximity, before it is read.
         "Cells",
         "NodeGrid",
-        "RidgeBoxes",
-        "RidgeGrid",
-        # Looks of one search.
-        *(f"Looks.{name}" for name in ("pair", "nodes", "is_held", "highest", "deepest", "close")),
-        *(f"Looks.{name}" for name in ("size_of_normal", "way", "wake", "left", "distance")),
-        *(f"Looks.{name}" for name in ("close_nodes", "foot", "push")),
+        "EdgeBoxes",
+        "EdgeGrid",
+        # Tests of one search.
+        *(
+            f"PairTests.{name}"
+            for name in ("pair", "nodes", "is_held", "highest", "deepest", "close")
+        ),
+        *(f"PairTests.{name}" for name in ("size_of_normal", "path", "wake", "left", "distance")),
+        *(f"PairTests.{name}" for name in ("close_nodes", "foot", "push")),
         *(f"NearPairs.{name}" for name in ("is_kept", "found_node", "found_face")),
-        *(f"RidgePairs.{name}" for name in ("asked", "end", "tip")),
+        *(f"EdgePairs.{name}" for name in ("due", "end", "tip")),
         # Stages of one step of the integrator.
         *(f"Stages.{name}" for name in ("positions", "last_positions", "velocities", "change")),
         *(f"Stages.{name}" for name in ("a1", "a2", "start_positions", "start_velocities")),
@@ -82,17 +85,17 @@ _OF_NODES = {
     "Springs": ("first", "room", "count", "stiffness_per_mass", "frequency_squared"),
     "CutSheet": ("node_stamp", "offset", "past_offset", "side", "nodes"),
     "Stages": ("external", "loads"),
-    "NodeWays": (
-        *("before", "reference", "displacement", "radius", "way", "moved_at", "is_folded"),
+    "NodeMotion": (
+        *("before", "reference", "displacement", "radius", "path", "moved_at", "self_proximity"),
     ),
-    "Folds": ("reference", "seen_at", "skin", "sorted", "outward"),
+    "SelfProximity": ("reference", "seen_at", "skin", "sorted", "outward"),
     "NearPairs": (
-        *("nodes", "seen_at", "cut_at", "moved_at", "lost_at", "is_lost", "found_in"),
+        *("nodes", "seen_at", "cut_at", "moved_at", "unpaired_at", "is_penetrating", "found_in"),
         *("face_moved_at", "moved", "begin", "end"),
     ),
     "SearchState": (
-        *("normal", "inverted_step", "is_due", "calm_until", "n_contacts", "listed_at", "share"),
-        *("floor_listed_at", "ridge_contact", "ridge_contact_at", "recovered"),
+        *("normal", "inverted_step", "is_due", "resting_until", "n_contacts", "listed_at", "share"),
+        *("floor_listed_at", "edge_contact", "edge_contact_at", "recovered"),
     ),
     "GeomSearch": ("near", "near_at", "listed", "normal"),
 }
@@ -117,15 +120,15 @@ _BEHIND_A_BLOCK = (
 
 _OF_PLACES = (
     *("triangle", "tetrahedron", "is_of_cut", "is_active", "seen_generation", "dirty_at"),
-    *("known_at", "way", "displacement", "low", "high"),
+    *("known_at", "path", "displacement", "low", "high"),
 )
 """Arrays of `NearPairs` with a row for each place of its faces."""
 
 _OF_EDGES = (
-    *("listed", "is_one", "is_of_cut", "dirty_at", "way", "node", "tip", "low", "high"),
+    *("listed", "is_feature", "is_of_cut", "dirty_at", "path", "node", "tip", "low", "high"),
     "outward",
 )
-"""Arrays of `Ridges` with three rows for each place."""
+"""Arrays of `FeatureEdges` with three rows for each place."""
 
 
 def rows_in_use(structs: Sequence[Arrays]) -> Iterator[RowsInUse]:
@@ -166,15 +169,15 @@ def _of_solid(solid: Any, body: Arrays) -> Iterable[RowsInUse]:
 
 
 def _of_search(search: Any) -> Iterable[RowsInUse]:
-    """Return what is in use of faces and ridges, which go by places of faces."""
+    """Return what is in use of faces and feature edges, which go by places of faces."""
     n = (search.faces, "n_places")
     for field in _OF_PLACES:
         yield RowsInUse(search.pairs, field, n)
     yield RowsInUse(search.pairs, "face_begin", n, lead=2)
     for field in _OF_EDGES:
-        array = getattr(search.ridges, field)
-        yield RowsInUse(search.ridges, field, n, 3 * array[:1].size)
-    yield RowsInUse(search.ridges, "first_pair", n, 3, lead=2)
+        array = getattr(search.edges, field)
+        yield RowsInUse(search.edges, field, n, 3 * array[:1].size)
+    yield RowsInUse(search.edges, "first_pair", n, 3, lead=2)
 
 
 STRUCTS = StructRules(SCRATCH, rows_in_use)

@@ -7,34 +7,34 @@ geom by geom, nodes before faces, each by its number.
 import math
 from typing import Final
 
-from tissue.contact.faces import Faces
-from tissue.contact.geoms.contact_impulses import note_velocities, weighted
-from tissue.contact.geoms.deepest_point import Deepest, deepest_point, is_flat_at
+from tissue.contact.geometry.faces import NO_FACE, Faces
 from tissue.contact.geoms.geom import PLANE
-from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts, Geoms
-from tissue.contact.geoms.geom_motion import place_geoms, way_of
-from tissue.contact.geoms.near_nodes import (
+from tissue.contact.geoms.geom_arrays import (
+    NODE_CONTACT,
+    GeomContacts,
+    Geoms,
     GeomSearch,
-    find_near_faces,
-    find_near_nodes,
-    reach_of,
+    motion_bound,
+    place_geoms,
 )
-from tissue.contact.geoms.signed_distance import distance_to
+from tissue.contact.geoms.kinematic_contact import note_velocities, weighted
+from tissue.contact.geoms.signed_distance import Deepest, deepest_point, distance_to, is_flat_at
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import largest_speed
 
 _SLACK: Final = 0.1
-"""How far nodes and geoms may move towards each other until contacts are searched again, per mean
+"""Approach of nodes and geoms after which contacts are searched again, per mean
 node size: 0.3 mm in an organ. The list reaches as far, and farther by what may come in one time
 step (`MARGIN`). Smaller: slow hands take a search in each time step; larger: nodes are missed."""
 
 _SLACK_OF_FACES: Final = 0.02
-"""The same where faces touch, whose deepest points move with the geoms: 60 um in an organ."""
+"""Approach where faces touch, whose deepest points move with the geoms: 60 um in an organ."""
 
 _SAGITTA: Final = 0.02
-"""How much deeper in a geom a face is between its corners than they are, per mean node size, for
+"""Depth of a face in a geom between its corners over theirs, per mean node size, for
 the face to need a contact of its own: 60 um in an organ. That contact is at a point of the material
 and stays there until another one is as much deeper. Larger: sharp geoms sink in between nodes;
 0: large spheres press on nodes and faces at once, and the point under a sphere runs to and fro as
@@ -51,24 +51,34 @@ go, and their forces with them."""
 _BEHIND: Final = 0.3
 """Cosine between the outward normals of tissue and geom above which the tissue is on the far side
 of the geom, and is not pushed: further out is further in. Smaller: the walls of a deep groove
-around a thin rod, which lean over it, are let through; 1: what has come round a thin rod is thrown
+around a thin rod, which lean over it, pass through; 1: what has come round a thin rod is thrown
 out by it."""
 
 _LEAST_RISE: Final = 0.5
-"""By how much the distance from a geom grows along the inward normal of a face, per way, where the
-geom presses on that face. Smaller: the face at the end of a bar that a rod lies across is pushed
-along the rod, and the rod tears the end open; larger: faces beside an edge are let through."""
+"""Least growth of the distance from a geom along the inward normal of a face, per distance, where
+the geom presses on that face. Smaller: the face at the end of a bar that a rod lies across is
+pushed along the rod, and the rod tears the end open; larger: faces next to an edge pass
+through."""
 
 POINTS_OF_FACE: Final = 3
 """Points at which one geom touches one face at most: a manifold, as a rod across a face has two."""
 
 _STAYS_WITHIN: Final = 0.06
-"""How much less deep than the deepest point of its face a point of contact is at most, per mean
+"""Largest depth of the deepest point of a face over that of a point of contact, per mean
 node size. More: points that have long been left stay listed; less: the two ends of a rod across a
 face press in turn."""
 
 LIST_IS_FULL: Final = -1
 """Returned where the list has no room for all contacts."""
+
+MARGIN: Final = 0.25
+"""Approach of a node beyond that at its present speed until it is listed, per mean
+node size: 0.8 mm in an organ. Larger: more is tested after each substep; smaller: lists last for
+a shorter time, and what is thrown at a geom is noticed late, and put out of it then."""
+
+LONGEST_EDGE: Final = 2.5
+"""Longest edge of a face, per mean node size, across which a geom may touch a face whose corners
+are all far from it. Smaller: a thin rod passes through the middle of a large face."""
 
 
 @kernel
@@ -96,10 +106,10 @@ def find_geom_contacts(
     for g in range(len(geoms.shape)):
         if geoms.is_near[g] == 0:
             continue
-        find_near_nodes(search, geoms, body, g)
+        _find_near_nodes(search, geoms, body, g)
         # No point of a face is deeper in a plane than its corners.
         if geoms.shape[g] != PLANE:
-            find_near_faces(search, faces, body)
+            _find_near_faces(search, faces, body)
         for i in range(search.n_near):
             node = search.near[i]
             if body.fixed[node] or not _may_node_touch(search, geoms, body, g, node):
@@ -109,7 +119,7 @@ def find_geom_contacts(
                 return LIST_IS_FULL
             _list_node(search, contacts, body, g, node, to)
         for i in range(search.n_touched):
-            if search.n_listed + POINTS_OF_FACE >= capacity:  # one row is for looking up
+            if search.n_listed + POINTS_OF_FACE >= capacity:  # one row is scratch
                 search.is_due = 1
                 return LIST_IS_FULL
             _list_face(search, contacts, faces, body, g, search.touched[i], to)
@@ -122,11 +132,11 @@ def find_geom_contacts(
 def _does_last_list(search: GeomSearch, contacts: GeomContacts, body: Body) -> bool:
     """Whether the list of the last search does for this time step too; begin the step if so."""
     geoms, motion = contacts.geoms, search.fastest * search.seconds
-    way = 0.0
+    shift = 0.0
     for g in range(len(geoms.shape)):
         if geoms.is_near[g] == 1:
-            way = max(way, way_of(geoms, g))
-    motion += way
+            shift = max(shift, motion_bound(geoms, g))
+    motion += shift
     slack = (_SLACK_OF_FACES if search.n_of_faces > 0 else _SLACK) * search.node_size
     if search.is_due == 1 or search.moved + max(motion - search.covered, 0.0) > slack:
         search.moved = search.covered = motion
@@ -148,7 +158,7 @@ def _may_node_touch(search: GeomSearch, geoms: Geoms, body: Body, g: int, node: 
     """Whether a node may touch geom `g` before the next search, with the outside of the tissue."""
     found, outward = distance_to(geoms, g, vec3(body.positions, node)), vec3(search.normal, node)
     is_behind = dot(outward, found.normal) > _BEHIND * norm(outward)
-    return bool(found.distance <= reach_of(search, geoms, g) and not is_behind)
+    return bool(found.distance <= _reach_of(search, geoms, g) and not is_behind)
 
 
 @kernel
@@ -186,7 +196,7 @@ def _list_face(
     area = norm(outward)
     if is_flat_at(at_a, at_b, at_c) or area == 0.0:
         return
-    reach, least = reach_of(search, geoms, g), _SAGITTA * search.node_size
+    reach, least = _reach_of(search, geoms, g), _SAGITTA * search.node_size
     nearest = min(at_a.distance, at_b.distance, at_c.distance)
     # No point of a face is nearer than its nearest corner by more than its longest edge.
     if nearest - max(norm(sub(b, a)), norm(sub(c, b)), norm(sub(a, c))) > reach:
@@ -231,7 +241,8 @@ def _leads_out(
 ) -> bool:
     """Whether the deepest point of a face gets out of geom `g` along the face's inward normal.
 
-    The normal of the geom does not tell: at a ridge of the distance it is that of one side alone.
+    The normal of the geom does not show it: at an edge of the distance it is that of one side
+    alone.
     """
     a, b, c = corners
     w, step = deepest.weights, _SAGITTA * search.node_size
@@ -262,7 +273,7 @@ def _old_row(search: GeomSearch, contacts: GeomContacts, c: int) -> int:
 def _go_on(
     search: GeomSearch, contacts: GeomContacts, body: Body, c: int, old: int, slop: float
 ) -> None:
-    """Let contact `c` go on as row `old` was, or begin where that is -1, without a force.
+    """Continue contact `c` as row `old`, or begin it without a force where that is -1.
 
     Args:
         search: Written.
@@ -310,3 +321,76 @@ def _is_before(contacts: GeomContacts, one: int, other: int) -> bool:
     if face[one] != face[other]:
         return bool(face[one] < face[other])
     return bool(node[one, 0] < node[other, 0])
+
+
+@kernel
+def _find_near_nodes(search: GeomSearch, geoms: Geoms, body: Body, g: int) -> None:
+    """Write the nodes that geom `g`, or a face around them, may touch before the next search."""
+    is_plane = geoms.shape[g] == PLANE
+    reach = _reach_of(search, geoms, g)
+    around = reach if is_plane else reach + LONGEST_EDGE * search.node_size
+    search.stamp += 1
+    search.n_near = search.n_touched = 0
+    low, high = _box(geoms, g)
+    low = Vec3(low.x - around, low.y - around, low.z - around)
+    high = Vec3(high.x + around, high.y + around, high.z + around)
+    for node in range(body.n_nodes):
+        x = vec3(body.positions, node)
+        if is_plane:
+            if distance_to(geoms, g, x).distance > around:
+                continue
+        elif not (low.x <= x.x <= high.x and low.y <= x.y <= high.y and low.z <= x.z <= high.z):
+            continue
+        search.near[search.n_near] = node
+        search.n_near += 1
+        search.near_at[node] = search.stamp
+        store(search.normal, node, Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def _find_near_faces(search: GeomSearch, faces: Faces, body: Body) -> None:
+    """Write the faces with a corner near the geom, and the normals of the near nodes."""
+    if search.n_near == 0:
+        return
+    near_at, stamp = search.near_at, search.stamp
+    for place in range(faces.n_places):
+        if faces.face[place] == NO_FACE:
+            continue
+        i, j, k = faces.node[place, 0], faces.node[place, 1], faces.node[place, 2]
+        if near_at[i] != stamp and near_at[j] != stamp and near_at[k] != stamp:
+            continue
+        a = vec3(body.positions, i)
+        area = cross(sub(vec3(body.positions, j), a), sub(vec3(body.positions, k), a))
+        for q in range(3):
+            node = faces.node[place, q]
+            store(search.normal, node, axpy(1.0, area, vec3(search.normal, node)))
+        if not (body.fixed[i] and body.fixed[j] and body.fixed[k]):
+            search.touched[search.n_touched] = place
+            search.n_touched += 1
+
+
+@kernel
+def _reach_of(search: GeomSearch, geoms: Geoms, g: int) -> float:
+    """Return how far from geom `g` a node is at most that it may touch before the next search."""
+    speed = search.fastest * search.seconds + motion_bound(geoms, g)
+    return float(MARGIN * search.node_size + speed)
+
+
+@kernel
+def _box(geoms: Geoms, g: int) -> tuple[Vec3, Vec3]:
+    """Return lowest and highest corner of a box around geom `g`, in the frame of the tissue."""
+    axes, middle, half = geoms.axes, vec3(geoms.middle, g), vec3(geoms.half, g)
+    x = _row(axes, g, 0, middle, half)
+    y = _row(axes, g, 3, middle, half)
+    z = _row(axes, g, 6, middle, half)
+    o = vec3(geoms.origin, g)
+    low = Vec3(o.x + x[0] - x[1], o.y + y[0] - y[1], o.z + z[0] - z[1])
+    return low, Vec3(o.x + x[0] + x[1], o.y + y[0] + y[1], o.z + z[0] + z[1])
+
+
+@kernel
+def _row(axes: FloatArray, g: int, k: int, middle: Vec3, half: Vec3) -> tuple[float, float]:
+    """Return the middle of a box along an axis of the tissue, and half its size there."""
+    a, b, c = axes[g, k], axes[g, k + 1], axes[g, k + 2]
+    at = a * middle.x + b * middle.y + c * middle.z
+    return at, abs(a) * half.x + abs(b) * half.y + abs(c) * half.z

@@ -16,12 +16,12 @@ BOX: Final = 5
 """Numbers of the shapes for kernels; a mesh has the next."""
 
 N_SIZES = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-"""How many sizes each shape has but for the mesh; the shapes are in the order of their numbers."""
+"""Number of sizes of each shape but for the mesh; the shapes are in the order of their numbers."""
 
 _SAME_PLANE = 1e-9
 """Difference of two planes of a hull, in unit normals and in sizes of the mesh, up to which they
-are one: the hull divides each flat side into triangles. Larger: sides that are nearly flat are lost
-one by one; smaller: each triangle is asked."""
+are one: the hull divides each flat side into triangles. Larger: sides that are nearly flat vanish
+one by one; smaller: each triangle is tested."""
 
 
 class Geom(NamedTuple):
@@ -33,7 +33,7 @@ class Geom(NamedTuple):
     """
 
     name: str
-    """Its name, for reports and errors."""
+    """Name of the geom, for reports and errors."""
     shape: str
     """One of those above."""
     size: tuple[float, ...] = ()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tissue.contact.faces import (
+from tissue.contact.geometry.faces import (
     Faces,
     grown_faces,
     new_faces,
@@ -14,27 +14,25 @@ from tissue.contact.faces import (
     with_room,
     with_skin,
 )
-from tissue.contact.geoms.contact_impulses import sum_wrenches
 from tissue.contact.geoms.contact_search import LIST_IS_FULL, find_geom_contacts
 from tissue.contact.geoms.geom import Geom, GeomForces
 from tissue.contact.geoms.geom_arrays import (
-    GeomContacts,
-    Geoms,
-    grown_geom_contacts,
-    new_geom_contacts,
-    new_geoms,
-)
-from tissue.contact.geoms.geom_motion import (
     MOVES_TOO_FAR,
     NO_ROTATION,
     ORIGIN_NOT_FINITE,
     TAKEN,
     TURNS_TOO_FAR,
-    largest_way,
+    GeomContacts,
+    Geoms,
+    GeomSearch,
+    grown_geom_contacts,
+    largest_motion,
     lead_geoms,
+    new_geom_contacts,
+    new_geoms,
     place_geoms,
 )
-from tissue.contact.geoms.near_nodes import GeomSearch
+from tissue.contact.geoms.kinematic_contact import sum_wrenches
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import SameTypes, kernel
@@ -48,15 +46,16 @@ CONTACTS_AT_FIRST = 64
 """Contacts that there is room for at first."""
 
 DEEPEST_AT_FIRST = 0.1
-"""How deep a node may be in a geom as contact begins, per mean node size: 0.3 mm in an organ. It is
-put out of it in the first substep. Deeper: the tissue around is thrown."""
+"""Largest depth of a node in a geom as contact begins, per mean node size: 0.3 mm in an organ. It
+is put out of it in the first substep. Deeper: the tissue around is thrown."""
 
 FARTHEST_IN_A_SUBSTEP = 0.5
-"""How far a geom moves in an increment at most, per half its thickness: what is on one side of it
+"""Largest motion of a geom in an increment, per half its thickness: what is on one side of it
 then is never beyond its middle in the next. Larger: a thin one passes through tissue."""
 
 LARGEST_TURN = 0.5 * math.pi
-"""Angle by which a geom may turn in a time step [rad]: beyond, which way it turned is a guess."""
+"""Angle by which a geom may turn in a time step [rad]: beyond, the direction of its turn is a
+guess."""
 
 
 MOST_INCREMENTS = 500
@@ -97,7 +96,7 @@ class GeomContact:
             raise ValueError(f"two geoms have the name {twice!r}")
         n_nodes, all_geoms = len(body.rest), new_geoms(list(self.geoms))
         self.arrays: GeomContacts = new_geom_contacts(all_geoms, CONTACTS_AT_FIRST, n_nodes)
-        """What kernels work on; another one where it grows."""
+        """Arrays of the contacts; others where they grow."""
         self._faces: Faces = with_skin(new_faces(len(body.tetrahedra)), body)
         of_nodes = ("near", "near_at", "listed")
         self._search = GeomSearch(
@@ -120,7 +119,7 @@ class GeomContact:
             **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
         )
         self._find, self._lead = SameTypes(find_geom_contacts), SameTypes(lead_geoms)
-        self._sum, self._way = SameTypes(sum_wrenches), SameTypes(largest_way)
+        self._sum, self._largest_motion = SameTypes(sum_wrenches), SameTypes(largest_motion)
         self._seconds = 0.0
         n = len(self.geoms)
         self._origins = np.zeros((n, 3))
@@ -172,38 +171,38 @@ class GeomContact:
                     NO_ROTATION: f"the rotation of {what} is {axes[g].tolist()}; it is three axes "
                     "as columns, right-handed",
                     TURNS_TOO_FAR: f"{what} turns by more than {LARGEST_TURN:.2g} rad in one step, "
-                    "so that which way is a guess. Take shorter steps",
+                    "so that its direction is a guess. Take shorter steps",
                     MOVES_TOO_FAR: f"{what} moves so far in one step, to {places[g].tolist()} m, "
-                    f"that it takes more than {MOST_INCREMENTS} increments to let nothing slip "
+                    f"that it takes more than {MOST_INCREMENTS} increments so that nothing slips "
                     "through it. Take shorter steps, or a thicker geom",
                 }[fault]
             )
         self._origins, self._rotations = places, axes
 
     def stop(self) -> None:
-        """Have every geom where it was to be at the end of the next step."""
+        """Place every geom where the next step would end."""
         if not self.geoms:
             return
         arrays = self.arrays.geoms
         arrays.origin_t0[:] = self._origins
         arrays.axes_t0[:] = self._rotations.reshape(-1, 9)
-        arrays.way[:] = arrays.turn[:] = 0.0
+        arrays.shift[:] = arrays.turn[:] = 0.0
         place_geoms(arrays, 1.0)
 
     @property
-    def way(self) -> tuple[FloatArray, FloatArray, IntArray]:
+    def target(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Where the geoms go in the next step, and which may be touched; none of it is written."""
         return self._origins, self._rotations, self.arrays.geoms.is_near.copy()
 
-    @way.setter
-    def way(self, way: tuple[FloatArray, FloatArray, IntArray]) -> None:
-        origins, rotations, are_near = way
+    @target.setter
+    def target(self, target: tuple[FloatArray, FloatArray, IntArray]) -> None:
+        origins, rotations, are_near = target
         if origins is not self._origins or rotations is not self._rotations:
             self.move(origins, rotations)
         self.consider(are_near)
 
     def consider(self, are_near: BoolArray | IntArray) -> None:
-        """Say which geoms the tissue may touch in the next steps, by a broad phase; shape (n,)."""
+        """Select the geoms that may touch in the next steps, by a broad phase; shape (n,)."""
         flags = self.arrays.geoms.is_near
         if (flags != are_near).any():
             flags[:] = are_near
@@ -216,10 +215,11 @@ class GeomContact:
 
     @property
     def n_increments(self) -> int:
-        """Into how many increments the next step is divided, so that no geom passes unseen."""
+        """Number of increments of the next step, so that no geom passes unseen."""
         if not self.geoms:
             return 1
-        return max(1, math.ceil(self._way.call(self.arrays.geoms) / FARTHEST_IN_A_SUBSTEP))
+        largest = self._largest_motion.call(self.arrays.geoms)
+        return max(1, math.ceil(largest / FARTHEST_IN_A_SUBSTEP))
 
     def begin_step(self, body: Body, dt: float) -> None:
         """Find the contacts of a step of that length [s]."""

@@ -15,24 +15,18 @@ dry friction in finite freedom dynamics, for impacts and friction in terms of ve
 
 from typing import Final
 
-from tissue.contact.geoms.contact_impulses import (
-    SWEEPS,
-    add_to_nodes,
-    mobility_at,
-    note_velocities,
-    push,
-    weighted,
-)
-from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts
-from tissue.contact.geoms.geom_motion import (
+from tissue.contact.geoms.geom_arrays import (
+    NODE_CONTACT,
+    GeomContacts,
     geom_motion_at,
     place_geoms,
     to_geom,
     turned_from_geom,
 )
 from tissue.contact.geoms.signed_distance import distance_to
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
+from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.mesh.body import Body
 
 _PUSH_OF_FACE: Final = 0.03
@@ -43,6 +37,11 @@ geom came suddenly stays in for longer than a few time steps."""
 
 _SLIDING: Final = 1.0 - 1e-9
 """Share of the limit of friction above which a contact slides: the rest is rounding."""
+
+SWEEPS: Final = 8
+"""Sweeps over contacts that share nodes. Fewer: a face that is pressed between its nodes sinks in
+by some percent of what it moves in a substep; more: time for nothing that shows, with 60 the work
+of what is put out is the same."""
 
 
 @kernel
@@ -66,7 +65,7 @@ def end_geom_substep(
         _locate(contacts, body, c, seconds, dt)
     _note_resistances(contacts, body, seconds)
     n_sweeps = SWEEPS if contacts.are_coupled == 1 else 1
-    # First positions: the velocities still tell with which forces the tissue resists.
+    # First positions: the velocities still show with which forces the tissue resists.
     for _ in range(n_sweeps):
         for c in rows:
             _push_out(contacts, body, c)
@@ -95,16 +94,16 @@ def _locate(contacts: GeomContacts, body: Body, c: int, seconds: float, dt: floa
     contacts.mobility[c] = 0.0
     force, motion = vec3(contacts.force, c), geom_motion_at(contacts.geoms, contacts.geom[c], point)
     relative = axpy(-1.0 / dt, motion, weighted(contacts, c, body.velocities))
-    # Twice the way: contacts beside may push the point this way.
+    # Twice the path: contacts nearby may push the point there.
     if dot(force, force) > 0.0 or contacts.gap[c] <= 2.0 * seconds * norm(relative):
         contacts.mobility[c] = mobility_at(contacts, body, c)
 
 
 @kernel
 def _note_resistances(contacts: GeomContacts, body: Body, seconds: float) -> None:
-    """Note with which forces the rest of the tissue acted on the nodes of contacts.
+    """Record with which forces the rest of the tissue acted on the nodes of contacts.
 
-    They tell what it was to displace the nodes after the last substep, too.
+    They give the work of the displacement after the last substep, too.
     """
     rows, resistance = (
         range(contacts.first, contacts.first + contacts.n_contacts),
@@ -183,7 +182,7 @@ def _push_out(contacts: GeomContacts, body: Body, c: int) -> None:
 
 @kernel
 def _hold(contacts: GeomContacts, body: Body, c: int) -> None:
-    """Take a point that sticks back to its anchor, and let the anchor of one that slides follow."""
+    """Take a point that sticks back to its anchor, and move the anchor of one that slides."""
     geoms, g, mobility = contacts.geoms, contacts.geom[c], contacts.mobility[c]
     force, normal = vec3(contacts.force, c), vec3(contacts.normal, c)
     x, press = weighted(contacts, c, body.positions), dot(force, normal)
@@ -209,14 +208,116 @@ def _hold(contacts: GeomContacts, body: Body, c: int) -> None:
 def _move(contacts: GeomContacts, body: Body, c: int, by: Vec3) -> None:
     """Displace the nodes of contact `c` by a vector over their masses [kg m].
 
-    The work is counted with the forces before. `_correct_work` adds what those after tell.
+    The work is counted with the forces before. `_correct_work` adds that of the forces after.
     """
     for q in range(3):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
         if weight != 0.0 and not body.fixed[node]:
-            way = scale(weight / body.masses[node], by)
-            store(body.positions, node, add(vec3(body.positions, node), way))
-            store(contacts.displacement, node, add(vec3(contacts.displacement, node), way))
-            work = dot(vec3(contacts.resistance, node), way)
+            shift = scale(weight / body.masses[node], by)
+            store(body.positions, node, add(vec3(body.positions, node), shift))
+            store(contacts.displacement, node, add(vec3(contacts.displacement, node), shift))
+            work = dot(vec3(contacts.resistance, node), shift)
             contacts.dissipated += work
             contacts.half_work[node] += 0.5 * work
+
+
+@kernel
+def weighted(contacts: GeomContacts, c: int, values: FloatArray) -> Vec3:
+    """Return nodal values at the point of contact `c`."""
+    node, weight = contacts.node, contacts.weight
+    total = scale(weight[c, 0], vec3(values, node[c, 0]))
+    for q in range(1, 3):
+        if weight[c, q] != 0.0:
+            total = axpy(weight[c, q], vec3(values, node[c, q]), total)
+    return total
+
+
+@kernel
+def mobility_at(contacts: GeomContacts, body: Body, c: int) -> float:
+    """Return by how much an impulse changes the velocity of the point of contact `c` [1/kg]."""
+    total = 0.0
+    for q in range(3):
+        node, weight = contacts.node[c, q], contacts.weight[c, q]
+        if not body.fixed[node]:
+            total += weight * weight / body.masses[node]
+    return total
+
+
+@kernel
+def add_to_nodes(
+    contacts: GeomContacts, body: Body, c: int, change: Vec3, values: FloatArray
+) -> None:
+    """Add what a change at the point of contact `c` does to its nodes, by weight and by mass.
+
+    Args:
+        contacts: Nodes and weights.
+        body: Masses; fixed nodes stay as they are.
+        c: The contact.
+        change: An impulse [N s], where `values` are velocities; a force [N], where they are
+            accelerations.
+        values: Written, shape (n_nodes, 3).
+    """
+    for q in range(3):
+        node, weight = contacts.node[c, q], contacts.weight[c, q]
+        if weight != 0.0 and not body.fixed[node]:
+            store(values, node, axpy(weight / body.masses[node], change, vec3(values, node)))
+
+
+@kernel
+def note_velocities(contacts: GeomContacts, body: Body, c: int) -> None:
+    """Record the velocities of the nodes of contact `c`."""
+    for q in range(3):
+        node = contacts.node[c, q]
+        store(contacts.velocity, node, vec3(body.velocities, node))
+
+
+@kernel
+def clear_geom_forces(contacts: GeomContacts, external: FloatArray) -> None:
+    """Set the forces on the nodes of all contacts to zero."""
+    for c in range(contacts.first, contacts.first + contacts.n_contacts):
+        for q in range(3):
+            store(external, contacts.node[c, q], Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def push(contacts: GeomContacts, c: int, impulse: Vec3, x: Vec3, v: Vec3, dt: float) -> None:
+    """Count an impulse of contact `c` on the tissue, and its works.
+
+    Args:
+        contacts: Impulses and works are written.
+        c: The contact.
+        impulse: On the tissue [N s].
+        x: Where it acts [m].
+        v: Velocity of the tissue there meanwhile [m/s].
+        dt: Length of the time step [s].
+    """
+    store(contacts.impulse, c, axpy(1.0, impulse, vec3(contacts.impulse, c)))
+    store(contacts.moment, c, axpy(1.0, cross(x, impulse), vec3(contacts.moment, c)))
+    of_geom = dot(impulse, geom_motion_at(contacts.geoms, contacts.geom[c], x)) / dt
+    contacts.work += of_geom
+    contacts.dissipated += of_geom - dot(impulse, v)
+
+
+@kernel
+def sum_wrenches(
+    contacts: GeomContacts,
+    origins: FloatArray,
+    per_second: float,
+    forces: FloatArray,
+    torques: FloatArray,
+) -> None:
+    """Add up the forces of the tissue on each geom in the time step.
+
+    Args:
+        contacts: Impulses on the tissue.
+        origins: Where torques are about, for each geom [m], shape (n, 3).
+        per_second: One over the length of the time step [1/s].
+        forces: Written [N], shape (n, 3); zero before.
+        torques: Written [N m], shape (n, 3); zero before.
+    """
+    for c in range(contacts.first, contacts.first + contacts.n_contacts):
+        g = contacts.geom[c]
+        store(forces, g, axpy(-per_second, vec3(contacts.impulse, c), vec3(forces, g)))
+        store(torques, g, axpy(-per_second, vec3(contacts.moment, c), vec3(torques, g)))
+    for g in range(len(forces)):
+        store(torques, g, axpy(-1.0, cross(vec3(origins, g), vec3(forces, g)), vec3(torques, g)))

@@ -1,4 +1,4 @@
-"""How far a point is from a rigid geom: negative inside, and in which direction it gets out.
+"""Distance of a point from a rigid geom: negative inside, and the direction out of it.
 
 All geoms are convex, and so is each of these functions of the point.
 """
@@ -14,17 +14,16 @@ from tissue.contact.geoms.geom import (
     PLANE,
     SPHERE,
 )
-from tissue.contact.geoms.geom_arrays import Geoms
-from tissue.contact.geoms.geom_motion import to_geom, turned_from_geom
+from tissue.contact.geoms.geom_arrays import Geoms, to_geom, turned_from_geom
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, dot, norm, scale, sub
+from tissue.core.vec3 import Vec3, add, dot, lerp, norm, scale, sub
 
 _OFF_CENTRE: Final = 1e-9
-"""How far from its axis a point of a capsule has a direction, per radius; and from a plane of
-symmetry a point of an ellipsoid is taken to be, per half its size: there the nearest point of the
-surface is one alone. Larger: distances near the middle are wrong by as much; 0: a division by zero
-there."""
+"""Distance from its axis from which a point of a capsule has a direction, per radius; and from a
+plane of symmetry a point of an ellipsoid is taken to be, per half its size: there the nearest point
+of the surface is one alone. Larger: distances near the middle are wrong by as much; 0: a division
+by zero there."""
 
 _NEWTON_STEPS: Final = 30
 """Newton steps to the nearest point of an ellipsoid at most. Far from round, 1 : 10 : 100, the most
@@ -33,14 +32,36 @@ that 10,000 random points took was 14."""
 _NEWTON_END: Final = 1e-14
 """Relative change at which they end: rounding."""
 
+_GOLDEN: Final = 0.6180339887498949
+"""Share that a section leaves of an interval."""
+
+_SECTIONS: Final = 11
+"""Sections of an interval: 0.5 % of an edge is left, which is how far the deepest point may be from
+the true one. More: time; fewer: contacts of faces wander."""
+
+_SAME_DIRECTION: Final = 1.0 - 1e-12
+"""Cosine between the normals at the three corners above which they are one: the geom is flat
+there, and no point of the triangle is deeper than the deepest corner."""
+
 
 class Distance(NamedTuple):
     """Where a point is with respect to a geom."""
 
     distance: float
-    """How far it is outside; negative inside [m]."""
+    """Distance outside; negative inside [m]."""
     normal: Vec3
     """Unit vector in which that grows fastest: out of the geom."""
+
+
+class Deepest(NamedTuple):
+    """The deepest point of a triangle."""
+
+    weights: Vec3
+    """Barycentric weights of the corners."""
+    distance: float
+    """Distance outside; negative inside [m]."""
+    normal: Vec3
+    """Unit vector out of the geom there."""
 
 
 @kernel
@@ -147,3 +168,63 @@ def _to_planes(p: Vec3, plane: FloatArray, first: int, end: int) -> Distance:
         if distance > farthest:
             farthest, best = distance, k
     return Distance(farthest, Vec3(plane[best, 0], plane[best, 1], plane[best, 2]))
+
+
+@kernel
+def is_flat_at(a: Distance, b: Distance, c: Distance) -> bool:
+    """Whether a geom is flat from corner to corner of a triangle."""
+    return bool(
+        dot(a.normal, b.normal) > _SAME_DIRECTION and dot(a.normal, c.normal) > _SAME_DIRECTION
+    )
+
+
+@kernel
+def deepest_point(geoms: Geoms, g: int, a: Vec3, b: Vec3, c: Vec3) -> Deepest:
+    """Return the point of triangle abc that is deepest in geom `g`, or nearest to it.
+
+    Lines are parallel to ab, at a share `u` of the distance from c.
+
+    Args:
+        geoms: Where they were placed last.
+        g: The geom.
+        a: First corner [m].
+        b: Second corner [m].
+        c: Third corner [m].
+    """
+    low, high = 0.0, 1.0
+    u1, u2 = high - _GOLDEN, _GOLDEN
+    t1, d1 = _deepest_on_line(geoms, g, lerp(u1, c, a), lerp(u1, c, b))
+    t2, d2 = _deepest_on_line(geoms, g, lerp(u2, c, a), lerp(u2, c, b))
+    for _ in range(_SECTIONS):
+        if d1 <= d2:
+            high, u2, t2, d2 = u2, u1, t1, d1
+            u1 = high - _GOLDEN * (high - low)
+            t1, d1 = _deepest_on_line(geoms, g, lerp(u1, c, a), lerp(u1, c, b))
+        else:
+            low, u1, t1, d1 = u1, u2, t2, d2
+            u2 = low + _GOLDEN * (high - low)
+            t2, d2 = _deepest_on_line(geoms, g, lerp(u2, c, a), lerp(u2, c, b))
+    u, t = (u1, t1) if d1 <= d2 else (u2, t2)
+    weights = Vec3(u * (1.0 - t), u * t, 1.0 - u)
+    x = add(add(scale(weights.x, a), scale(weights.y, b)), scale(weights.z, c))
+    found = distance_to(geoms, g, x)
+    return Deepest(weights, found.distance, found.normal)
+
+
+@kernel
+def _deepest_on_line(geoms: Geoms, g: int, p: Vec3, q: Vec3) -> tuple[float, float]:
+    """Return the share of the line from p to q where the distance is least, and that [m]."""
+    low, high = 0.0, 1.0
+    t1, t2 = high - _GOLDEN, _GOLDEN
+    d1 = distance_to(geoms, g, lerp(t1, p, q)).distance
+    d2 = distance_to(geoms, g, lerp(t2, p, q)).distance
+    for _ in range(_SECTIONS):
+        if d1 <= d2:
+            high, t2, d2 = t2, t1, d1
+            t1 = high - _GOLDEN * (high - low)
+            d1 = distance_to(geoms, g, lerp(t1, p, q)).distance
+        else:
+            low, t1, d1 = t1, t2, d2
+            t2 = low + _GOLDEN * (high - low)
+            d2 = distance_to(geoms, g, lerp(t2, p, q)).distance
+    return (t1, d1) if d1 <= d2 else (t2, d2)

@@ -8,17 +8,17 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from tissue import Geom
-from tissue.contact.geoms.geom_arrays import new_geoms
-from tissue.contact.geoms.geom_motion import place_geoms
-from tissue.contact.geoms.signed_distance import distance_to
+from tissue.contact.geoms.geom_arrays import new_geoms, place_geoms
+from tissue.contact.geoms.signed_distance import deepest_point, distance_to
 from tissue.core.vec3 import Vec3
 
 pytestmark = pytest.mark.kernel
 
 ROUNDING = 5e-9
-"""Errors of distances [m]: an ellipsoid takes points 1e-9 of its size beside planes of symmetry."""
+"""Errors of distances [m]: an ellipsoid takes points 1e-9 of its size off planes of symmetry."""
 
 TETRAHEDRON = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.03, 0], [0, 0, 0.04]])
+
 GEOMS = {
     "plane": Geom("a", "plane"),
     "sphere": Geom("a", "sphere", (0.02,)),
@@ -28,6 +28,14 @@ GEOMS = {
     "box": Geom("a", "box", (0.01, 0.02, 0.03)),
     "mesh": Geom("a", "mesh", vertices=TETRAHEDRON),
 }
+
+coordinate = st.floats(-0.05, 0.05)
+
+anywhere = st.tuples(coordinate, coordinate, coordinate)
+
+N = 24
+
+WEIGHTS = np.array([(i, j, N - i - j) for i in range(N + 1) for j in range(N + 1 - i)]) / N
 
 
 def distance(geom, x):
@@ -55,10 +63,6 @@ def is_inside(geom, x):
             return (np.abs(x) < size).all(axis=1)
     sides = ConvexHull(geom.vertices).equations
     return (x @ sides[:, :3].T + sides[:, 3] < 0.0).all(axis=1)
-
-
-coordinate = st.floats(-0.05, 0.05)
-anywhere = st.tuples(coordinate, coordinate, coordinate)
 
 
 @pytest.mark.parametrize("shape", GEOMS)
@@ -122,7 +126,11 @@ def test_a_hull_has_each_flat_side_once():
 
 def test_a_geom_is_where_it_was_placed():
     geoms, turned = new_geoms([GEOMS["box"]]), Rotation.from_rotvec([0.3, -0.8, 0.5])
-    geoms.origin_t0[0], geoms.turn[0], geoms.way[0] = (0.1, 0.0, 0.0), turned.as_rotvec(), (0, 1, 0)
+    geoms.origin_t0[0], geoms.turn[0], geoms.shift[0] = (
+        (0.1, 0.0, 0.0),
+        turned.as_rotvec(),
+        (0, 1, 0),
+    )
     place_geoms(geoms, 1.0)
     x = np.array([0.12, 1.03, 0.01])
     own = turned.inv().apply(x - [0.1, 1.0, 0.0])
@@ -130,3 +138,32 @@ def test_a_geom_is_where_it_was_placed():
     found = distance_to(geoms, 0, Vec3(*x))
     assert found.distance == pytest.approx(far, abs=1e-15)
     assert np.array(found.normal) == pytest.approx(turned.apply(normal), abs=1e-12)
+
+
+def triangles(seed, n):
+    """Triangles with edges of some centimetres around the geoms."""
+    return np.random.default_rng(seed).uniform(-0.03, 0.03, (n, 3, 3))
+
+
+@pytest.mark.parametrize("shape", GEOMS)
+def test_no_point_of_the_triangle_is_deeper_by_more_than_half_a_percent_of_an_edge(shape):
+    geoms = new_geoms([GEOMS[shape]])
+    for corners in triangles(1, 25):
+        found = deepest_point(geoms, 0, *(Vec3(*corner) for corner in corners))
+        weights = np.array(found.weights)
+        others = [distance_to(geoms, 0, Vec3(*x)).distance for x in WEIGHTS @ corners]
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
+        assert found.distance <= min(others) + 0.005 * longest
+        assert weights.sum() == pytest.approx(1.0)
+        assert weights.min() >= -1e-12
+        at = distance_to(geoms, 0, Vec3(*(weights @ corners)))
+        assert at.distance == pytest.approx(found.distance, abs=1e-12)
+
+
+def test_a_ball_above_the_middle_of_a_face_touches_it_there():
+    geoms = new_geoms([GEOMS["sphere"]])
+    geoms.origin[0] = (0.0, 0.0, 0.015)
+    corners = 0.05 * np.array([[1, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
+    found = deepest_point(geoms, 0, *(Vec3(*corner) for corner in corners))
+    assert np.array(found.weights) == pytest.approx([1 / 3] * 3, abs=0.02)
+    assert found.distance == pytest.approx(-0.005, abs=2e-5)

@@ -1,0 +1,72 @@
+"""Feature edges of simple bodies: those of a box, and none inside its sides."""
+
+import numpy as np
+import pytest
+
+from tissue import TetrahedralMesh, block
+from tissue.contact.geometry.edges import face_across, is_feature_edge
+from tissue.mesh.body import OUTER, build_body
+from tissue.mesh.faces import OUTWARD
+
+pytestmark = pytest.mark.kernel
+
+
+def boundary_edges(body):
+    """Return every edge of every boundary face: tetrahedron, face, edge, and its two ends."""
+    return [
+        (t, f, k, *(int(body.tetrahedra[t, OUTWARD[f, (k + q) % 3]]) for q in (0, 1)))
+        for t, f in zip(*np.nonzero(body.links == OUTER), strict=True)
+        for k in range(3)
+    ]
+
+
+def without(mesh, low):
+    """Return a mesh without the tetrahedra whose centroid is beyond `low` [m] along every axis."""
+    middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
+    kept = mesh.tetrahedra[~(middles > low).all(axis=1)]
+    nodes, renamed = np.unique(kept, return_inverse=True)
+    return TetrahedralMesh(mesh.positions[nodes], renamed.reshape(-1, 4))
+
+
+def test_the_face_across_an_edge_is_the_other_face_with_that_edge():
+    body = build_body(block((2, 2, 1), (0.02, 0.02, 0.01)), None, None)
+    edges = boundary_edges(body)
+    for t, f, k, a, b in edges:
+        (beyond,) = ((u, g, m) for u, g, m, c, d in edges if (c, d) == (b, a))
+        face, tip = face_across(body, t, f, k)
+        assert face == 4 * beyond[0] + beyond[1]
+        assert tip == body.tetrahedra[beyond[0], OUTWARD[beyond[1], (beyond[2] + 2) % 3]]
+
+
+def test_only_the_box_edges_of_a_block_are_feature_edges():
+    size = np.array([0.02, 0.02, 0.01])
+    body = build_body(block((2, 2, 1), size), None, None)
+    for t, f, k, a, b in boundary_edges(body):
+        ends = body.rest[[a, b]]
+        n_sides = sum((ends[:, x] == side).all() for x in range(3) for side in (0.0, size[x]))
+        assert is_feature_edge(body, t, f, k) == (n_sides == 2)
+
+
+def test_the_inner_edge_of_an_l_shape_is_no_feature_edge():
+    mesh = without(block((2, 1, 2), (0.02, 0.01, 0.02)), [0.01, 0.0, 0.01])
+    body = build_body(mesh, None, None)
+    inner = outer = 0
+    for t, f, k, a, b in boundary_edges(body):
+        ends = body.rest[[a, b]]
+        if (ends[:, [0, 2]] == 0.01).all():
+            assert not is_feature_edge(body, t, f, k)
+            inner += 1
+        elif (ends[:, [0, 2]] == 0.0).all():
+            assert is_feature_edge(body, t, f, k)
+            outer += 1
+    assert inner == 2 and outer == 2
+
+
+def test_the_edge_of_a_thin_wedge_is_a_feature_edge():
+    """The two faces at the edge are only two degrees apart."""
+    thin = 0.0175
+    wedge = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.5, thin], [1.0, 0.5, -thin]])
+    body = build_body(TetrahedralMesh(0.01 * wedge, np.array([[0, 1, 2, 3]])), None, None)
+    edges = [row for row in boundary_edges(body) if {row[3], row[4]} == {0, 1}]
+    assert len(edges) == 2
+    assert all(is_feature_edge(body, t, f, k) for t, f, k, _, _ in edges)

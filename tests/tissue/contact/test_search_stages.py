@@ -1,0 +1,50 @@
+"""What is at rest is left alone; the contacts are those of tests of all pairs in every search."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, strokes
+from tests.test_contact import pressed_blocks
+from tissue import Material, Tissue, block
+
+
+def wake_all(tissue: Tissue) -> None:
+    """Make the next search test all nodes and all pairs of edges."""
+    search = tissue._system.contact._search
+    search.all_resting_until = search.edge_pairs.resting_until = -np.inf
+    search.resting_until[:] = -np.inf
+
+
+def cut_block() -> Tissue:
+    """Return a block that a stroke has cut in two, one part of which falls on the floor."""
+    mesh = block((4, 3, 3), (0.04, 0.03, 0.03))
+    fixed = mesh.positions[:, 0] <= 0.02
+    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.02)
+    strokes.make(tissue, strokes.straight(mesh, 0.75))
+    return tissue
+
+
+def squeezed_block() -> Tissue:
+    """Return a block with a ragged cut whose lips press on each other under gravity."""
+    mesh = bodies.jittered(3, 0)
+    fixed = mesh.positions[:, 2] < 1e-3
+    tissue = Tissue(mesh, Material(viscous_damping=5.0), fixed=fixed)
+    edges = [[(-0.01, y, 0.0207), (0.05, y, 0.0187)] for y in (-0.01, 0.02, 0.06)]
+    assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
+    return tissue
+
+
+@pytest.mark.parametrize("make", [pressed_blocks, cut_block, squeezed_block])
+def test_contacts_are_the_same_to_the_bit_as_if_all_were_tested(make):
+    tissue, other = make(), make()
+    n_contacts = 0
+    for _ in range(200):
+        result = tissue.step(None, strokes.DT)
+        wake_all(other)
+        wanted = other.step(None, strokes.DT)
+        assert result.body_contacts.n_contacts == wanted.body_contacts.n_contacts
+        assert result.body_contacts.force == wanted.body_contacts.force
+        n_contacts += result.body_contacts.n_contacts
+    for one, same in zip(tissue.snapshot(), other.snapshot(), strict=True):
+        np.testing.assert_array_equal(one, same)
+    assert n_contacts > 200
