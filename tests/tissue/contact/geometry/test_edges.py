@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from tissue import TetrahedralMesh, block
-from tissue.contact.geometry.edges import face_across, is_feature_edge
+from tissue.contact.geometry.edges import (
+    Edges,
+    crossing_of,
+    distance_of_edges,
+    face_across,
+    is_feature_edge,
+    is_inner,
+    separation,
+)
+from tissue.core.vec3 import Vec3
 from tissue.mesh.body import OUTER, build_body
 from tissue.mesh.faces import OUTWARD
 
@@ -70,3 +79,22 @@ def test_the_edge_of_a_thin_wedge_is_a_feature_edge():
     edges = [row for row in boundary_edges(body) if {row[3], row[4]} == {0, 1}]
     assert len(edges) == 2
     assert all(is_feature_edge(body, t, f, k) for t, f, k, _, _ in edges)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_distance_of_edges_is_the_least_of_their_points_and_lines_cross_at_it(seed):
+    random, share = np.random.default_rng(seed), np.linspace(0.0, 1.0, 101)
+    n_inner = 0
+    for a, b, c, d in random.normal(size=(40, 4, 3)):
+        at = Edges(*(Vec3(*x) for x in (a, b, c, d)))
+        one, other = a + share[:, None] * (b - a), c + share[:, None] * (d - c)
+        sampled = np.linalg.norm(one[:, None] - other[None], axis=2).min()
+        longest = max(np.linalg.norm(b - a), np.linalg.norm(d - c))
+        assert sampled - 0.01 * longest <= distance_of_edges(at) <= sampled + 1e-12
+        crossing = crossing_of(at)
+        apart = np.array(separation(at, crossing.s, crossing.t))
+        np.testing.assert_allclose(apart, crossing.gap * np.array(crossing.normal), atol=1e-9)
+        if is_inner(crossing.s) and is_inner(crossing.t):
+            assert distance_of_edges(at) == pytest.approx(abs(crossing.gap))
+            n_inner += 1
+    assert n_inner > 3
