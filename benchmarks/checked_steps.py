@@ -9,11 +9,11 @@ and saved. "a save" is the mean of the steps that saved a state, "others" the me
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from statistics import mean, median
 
 from bridge import InProcessLink
 from scalpel_sim import SCENES, prepare
+from scalpel_sim.scene.scene import changed
 from tissue import BladeSweep, StepResult
 
 MICROSECONDS = 1e6
@@ -37,7 +37,7 @@ class Timed:
 def main() -> None:
     """Print the times."""
     names = [name for name in sys.argv[1:] if not name.startswith("-")] or ["organ"]
-    scene = replace(SCENES[names[0]], audit="--no-audit" not in sys.argv)
+    scene = changed(SCENES[names[0]], audit="--no-audit" not in sys.argv)
     simulation = prepare(scene)
     link = simulation.link
     assert isinstance(link, InProcessLink)

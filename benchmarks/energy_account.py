@@ -18,7 +18,8 @@ from rich.table import Table
 
 from scalpel_sim import SCENES
 from scalpel_sim.bench.random_strokes import STROKE_DT, STROKE_FLOOR, random_stroke
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.scene import changed
 from tissue import BladeSweep, Energies
 
 CLOSED = 0.01
@@ -46,8 +47,8 @@ def main() -> int:
     if options.law:
         ratio = 0.45 if options.law == "neo_hookean" else 0.25
         material = replace(material, law=options.law, poisson_ratio=ratio)
-    how = {"relaxation": options.relaxation, "contact": options.contact, "audit": True}
-    tissue = make_tissue(replace(scene, material=material, floor=STROKE_FLOOR, table=None, **how))
+    how = {"relaxation": options.relaxation, "audit": True}
+    tissue = make_tissue(changed(scene, material=material, floor=STROKE_FLOOR, table=None, **how))
     random = np.random.default_rng(options.seed)
     table = Table(
         title=f"organ, law {material.law}, relaxation {options.relaxation}; % of the work"

@@ -17,8 +17,8 @@ from time import perf_counter_ns
 from typing import Any
 
 from scalpel_sim import SCENES
-from scalpel_sim.preparation import prepare
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 from tissue import BladeShape
 
@@ -106,14 +106,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--frames", type=int, default=2000)
     parser.add_argument("--audit", action="store_true")
-    parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
     options = parser.parse_args()
     scene = changed(
         SCENES["grid2"],
         material=SCENES["organ"].material,
         blade=BladeShape(),
         audit=options.audit,
-        contact=options.contact,
         speed=0.02,
     )
     watches = Watches()

@@ -10,13 +10,13 @@ The last line is the ratio of the medians of the later half of the frames.
 import argparse
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
 
 from bridge import GeomPoses, TouchedGeoms
 from scalpel_sim import SCENES
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.scene import changed
 from tissue import FloatArray, Geom, Tissue
 
 DT = 1e-3
@@ -48,7 +48,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--frames", type=int, default=600)
     options = parser.parse_args()
-    scene = replace(SCENES["organ"], table=None)
+    scene = changed(SCENES["organ"], table=None)
     alone, touched = make_tissue(scene), make_tissue(scene)
     for tissue in (alone, touched):
         tissue.push("top", (0.0, 0.0, -1e-6))

@@ -9,7 +9,6 @@ with all that is done between them. The run is that of the scene, and rests afte
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.scene.scene import changed
 
 N_LOOKS = 10
 MILLISECONDS = 1e3
@@ -42,7 +42,7 @@ def main() -> None:
 
 def figures(name: str, seconds: float, every: float) -> tuple[list[float], np.ndarray]:
     """Return the memory of the process at times [bytes], and the times between frames [s]."""
-    scene = replace(SCENES[name], seconds=seconds)
+    scene = changed(SCENES[name], seconds=seconds)
     simulation = prepare(scene)
     n_frames = round(seconds / simulation.dt)
     clock, memory = np.zeros(n_frames), []

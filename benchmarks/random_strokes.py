@@ -22,7 +22,8 @@ from rich.table import Table
 
 from scalpel_sim import SCENES
 from scalpel_sim.bench.random_strokes import STROKE_DT, STROKE_FLOOR, random_stroke
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.scene import changed
 from tissue import BladeSweep, Tissue, TissueError
 
 FASTEST = 5.0
@@ -51,10 +52,10 @@ def main() -> int:
     if options.law:
         ratio = 0.45 if options.law == "neo_hookean" else 0.25
         material = replace(material, law=options.law, poisson_ratio=ratio)
-    relaxation = options.relaxation or scene.relaxation
+    relaxation = options.relaxation or scene.solver.relaxation
     contact = options.contact
-    scene = replace(scene, material=material, relaxation=relaxation, contact=contact)
-    tissue = make_tissue(replace(scene, floor=STROKE_FLOOR, table=None))
+    scene = changed(scene, material=material, relaxation=relaxation)
+    tissue = make_tissue(changed(scene, floor=STROKE_FLOOR, table=None))
     random = np.random.default_rng(options.seed)
     how = f"relaxation {relaxation}, contact {contact or 'by default'}"
     table = Table(title=f"organ, law {material.law}, {how}")

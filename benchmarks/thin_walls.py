@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.scene.blade import SCALPEL
-from scalpel_sim.scene_parts.scene import GEL
+from scalpel_sim.scene.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.stroke import Stroke
 from tests import bodies

@@ -15,9 +15,7 @@ import numpy as np
 from rich.console import Console
 
 from scalpel_sim import Simulation, prepare
-from scalpel_sim.scene_file.build import scene_in
-from scalpel_sim.scene_file.layers import with_settings
-from scalpel_sim.scene_file.reading import shipped_scene
+from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.strokes.asked_area import asked_area
 from tests.scalpel_sim.moved_scenes import moved
 from tissue import Piece, pieces_of

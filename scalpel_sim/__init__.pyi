@@ -4,16 +4,17 @@ from .arm.grasper import add_grasper as add_grasper
 from .instruments.driven_grasper import between_pads as between_pads
 from .instruments.geom_coupling import GeomCoupling as GeomCoupling
 from .instruments.grip import Grip as Grip
-from .preparation import prepare as prepare
+from .preparation.prepare import prepare as prepare
 from .scene.blade import SCALPEL as SCALPEL
-from .scene_parts.scene import Scene as Scene
-from .scenes import SCENES as SCENES
-from .scenes import read_scene as read_scene
+from .scene.read import SCENES as SCENES
+from .scene.read import read_scene as read_scene
+from .scene.scene import Scene as Scene
+from .scene.scene import changed as changed
+from .scene.schema import GrasperTable as GrasperTable
+from .scene.schema import WaypointTable as WaypointTable
+from .scene.strokes import StrokeTable as StrokeTable
 from .simulation import Simulation as Simulation
 from .state import SimulationState as SimulationState
-from .tables.grasper import GrasperTable as GrasperTable
-from .tables.grasper import WaypointTable as WaypointTable
-from .tables.stroke import StrokeTable as StrokeTable
 from .viewer.viewer import Viewer as Viewer
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "WaypointTable",
     "add_grasper",
     "between_pads",
+    "changed",
     "prepare",
     "read_scene",
 ]

@@ -6,8 +6,8 @@ import numpy as np
 
 from bridge import InProcessLink, TissueFrame
 from scalpel_sim.arm.placement import place
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray, Tissue
@@ -38,7 +38,7 @@ def prepare_cut(cut: PlannedCut, tissue: Tissue | None = None) -> Simulation:
     link = InProcessLink(tissue or make_tissue(cut.scene), cut.scene.name)
     bounds = link.describe().bounds
     stroke = _stroke(cut, bounds)
-    placement = place(stroke, bounds, cut.scene.arm)
+    placement = place(stroke, bounds, cut.scene.arm.preset)
     frame = TissueFrame(origin=placement.tissue_origin)
     return Simulation(placement.arm(), stroke, link, frame)
 

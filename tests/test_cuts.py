@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.scene.blade import SCALPEL
-from scalpel_sim.scene_parts.scene import GEL
+from scalpel_sim.scene.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from tests import bodies, soundness, strokes
 from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe, read_mesh

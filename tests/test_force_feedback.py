@@ -8,8 +8,8 @@ import pytest
 
 from bridge.poses import motion
 from scalpel_sim import SCENES, Scene, Simulation, prepare
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.scene import changed
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult
 
 ACTION_IS_REACTION = 1e-9
@@ -257,7 +257,7 @@ def force_alone(start: BladeSegment, indentation: float) -> float:
 
 
 def test_the_force_on_the_arm_never_exceeds_the_limit_of_its_device():
-    scene = changed(SCENES["grid2"], toughness=200.0, young_modulus=100e3, arm="touch")
+    scene = changed(SCENES["grid2"], toughness=200.0, young_modulus=100e3, preset="touch")
     found = run(scene, 0.0)
     applied_force = np.linalg.norm(found.simulation.recording.vector("force"), axis=1)
     reported = np.linalg.norm(found.forces(), axis=1)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from scalpel_sim.scene_parts.scene import GEL
+from scalpel_sim.scene.scene import GEL
 from tests import bodies, strokes
 from tests.overlaps import ELEMENT, NO_GRAVITY, overlap_depths
 from tests.test_conservation import momentum

@@ -14,7 +14,7 @@ from bridge import Bridge, VirtualCoupling
 from bridge.counters import Counters
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.arm.arm import Arm
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.validate.coupling import work_on_tissue
 from tests.bridge.coupling.walls import Wall
@@ -185,7 +185,9 @@ def test_a_virtual_coupling_creates_no_energy_without_the_controller(hand, every
     assert found.force.max() < 700.0 * DEPTH
 
 
-TISSUE = changed(SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, arm="touch", speed=0.2)
+TISSUE = changed(
+    SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, preset="touch", speed=0.2
+)
 """Scene with a blade of 38 mm on gel of 10 kPa; their contact stiffness is 1.5 kN/m."""
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.scene_parts.scene import GEL
+from scalpel_sim.scene.scene import GEL
 from tests import strokes
 from tissue import SolverSettings, TetrahedralMesh, Tissue, block
 

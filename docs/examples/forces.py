@@ -1,10 +1,8 @@
 """Read all that a step says of the forces: wrench, stiffness, contacts, and where the work went."""
 
-from dataclasses import replace
+from scalpel_sim import SCALPEL, SCENES, changed, prepare
 
-from scalpel_sim import SCALPEL, SCENES, prepare
-
-simulation = prepare(replace(SCENES["slab"], blade=SCALPEL, audit=True))
+simulation = prepare(changed(SCENES["slab"], blade=SCALPEL, audit=True))
 simulation.run(seconds=0.6)
 result = simulation.result
 wrench, contacts, energies = result.wrench_t1, result.contacts, result.energies

@@ -25,8 +25,8 @@ from scalpel_sim.arm.place_search import (
 )
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.strokes import DRAWN_STROKES
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.tables.stroke import DRAWN_STROKES
 from tissue import FloatArray
 
 AUTO = "auto"

@@ -4,7 +4,6 @@ import itertools
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,14 +25,13 @@ from scalpel_sim.bench.tables import compact_table, print_skipped, three_digits
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.errors import UsageError
-from scalpel_sim.preparation import prepare
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.runs.run import run_time
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_parts.choices import can_audit
-from scalpel_sim.scene_parts.scene import Scene
-from scalpel_sim.scenes import scene_called
+from scalpel_sim.scene.checks import can_audit
+from scalpel_sim.scene.read import scene_called
+from scalpel_sim.scene.scene import Scene, changed, material_called
 from scalpel_sim.simulation import Simulation, no_garbage_collection
-from scalpel_sim.tables.material import material_called
 from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
 
 if TYPE_CHECKING:
@@ -156,14 +154,14 @@ def measure_real_time(
 def _scene(name: str, material: str) -> Scene:
     """Return a scene in a material."""
     scene = scene_called(name)
-    return scene if material == AS_SHIPPED else replace(scene, material=material_called(material))
+    return scene if material == AS_SHIPPED else changed(scene, material=material_called(material))
 
 
 def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
     """Do the stroke of a scene once."""
     scene = _scene(case.scene, case.material)
-    audit = case.what == "account" and can_audit(scene.relaxation)
-    simulation = prepare(replace(scene, audit=audit))
+    audit = case.what == "account" and can_audit(scene.solver.relaxation)
+    simulation = prepare(changed(scene, audit=audit))
     n_tetrahedra = simulation.link.describe().n_tetrahedra
     substeps: list[int] = []
 
@@ -192,7 +190,7 @@ def _random_stroke_frames(
     name: str, material: str, counts: Sequence[int], seconds: float | None, watch: Watch
 ) -> list[tuple[TimedRun, Frames]]:
     """Time frames after random strokes on one body: at rest, and in the stroke that follows."""
-    scene = replace(_scene(name, material), audit=False, floor=STROKE_FLOOR, table=None)
+    scene = changed(_scene(name, material), audit=False, floor=STROKE_FLOOR, table=None)
     tissue = make_tissue(scene)  # no table: strokes come from all sides
     random = np.random.default_rng(_SEED)
     found, done = [], 0

@@ -18,9 +18,9 @@ from scalpel_sim.bench.tables import print_measurements
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.output.summary import STAGES
-from scalpel_sim.preparation import prepare
+from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.recording.recording import Recording
-from scalpel_sim.scenes import SCENES, scene_called
+from scalpel_sim.scene.read import SCENES, scene_called
 from scalpel_sim.simulation import Simulation
 from tissue import FloatArray
 

@@ -26,10 +26,11 @@ from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.output.summary import MACHINE, STAGES, TABLE_1
 from scalpel_sim.planned_cut import PlannedCut, prepare_cut
+from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.recording import Recording
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_parts.choices import SCHEMES
-from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scene.body import GivenBody
+from scalpel_sim.scene.checks import SCHEMES
+from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
@@ -167,7 +168,8 @@ def print_rows(rows: Sequence[GridRow], console: "Console") -> None:
 def _cut_grid(cells: _Cells, scheme: str) -> GridRow:
     """Cut one grid."""
     size = [_CELL * n for n in cells]
-    scene = Scene("table1", "a grid of the paper", lambda: block(cells, size), scheme=scheme)
+    body = GivenBody(source=lambda: block(cells, size))
+    scene = changed(Scene(name="table1", about="a grid of the paper", body=body), scheme=scheme)
     tissue = make_tissue(scene)
     n_before = tissue.n_tetrahedra
     simulation = prepare_cut(PlannedCut(scene, _PATH, _DEPTHS[cells]), tissue)

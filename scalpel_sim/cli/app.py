@@ -156,9 +156,9 @@ def _serve(
     from bridge import serve as serve_tissue
     from scalpel_sim.cli.run_setup import springs_as_asked
     from scalpel_sim.cli.scene_options import chosen_scene
+    from scalpel_sim.preparation.tissue import check_scene, make_tissue
     from scalpel_sim.runs.prepared_run import load_kernels
-    from scalpel_sim.scene_body import check_scene, make_tissue
-    from scalpel_sim.tables.view import sent_views
+    from scalpel_sim.scene.served import sent_views
 
     with log_to_stderr(printing):
         secret = chosen_key(key)
@@ -234,11 +234,14 @@ def _materials(
         force: Replace the file if it exists.
     """
     with log_to_stderr(printing):
-        from scalpel_sim.cli.materials import chosen_presets, presets_as_json, print_presets
+        from scalpel_sim.cli.materials import (
+            chosen_presets,
+            presets_as_json,
+            print_presets,
+            write_template,
+        )
 
         if write is not None:
-            from scalpel_sim.cli.material_template import write_template
-
             write_template(write, name, force=force)
             if not printing.quiet:
                 print(f"{write}: written; use it with --material {write} --blade {write}")

@@ -1,18 +1,31 @@
-"""The materials that come with the project, as a table with the source of each figure."""
+"""The materials that come with the project: a table with the source of each figure, and a file."""
 
 import json
+import re
+import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+import msgspec
+import tomlkit
 from rich.console import Console
 from rich.table import Table
 
-from scalpel_sim.errors import unknown
-from scalpel_sim.scenes import SCENES
-from tissue import DAMPING_BAND, MATERIALS, Preset, SourcedValue
+from scalpel_sim.cli.new_command import write_new_file
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.blade import SCALPEL, table_of_blade
+from scalpel_sim.scene.key_texts import texts_of
+from scalpel_sim.scene.read import PHANTOM, SCENES
+from scalpel_sim.scene.schema import BladeTable, MaterialTable
+from scalpel_sim.scene.text_files import SUFFIX
+from tissue import DAMPING_BAND, MATERIALS, Material, Preset, SourcedValue
 
 _KPA_PER_PA = 1e-3
 _MM_PER_M = 1e3
+
+_WIDTH = 96
+"""Length of the lines of a comment."""
 
 _NOT_CONFIRMED = "*"
 """Marks a figure that could not be traced to a measurement."""
@@ -95,3 +108,71 @@ def _as_numbers(preset: Preset) -> dict[str, Any]:
     """Return a preset as numbers and text, for JSON."""
     figures = {name: figure._asdict() for name, figure in preset.values.items()}
     return {"name": preset.name, "about": preset.about, "law": preset.law} | figures
+
+
+def write_template(path: Path, name: str | None, *, force: bool = False) -> None:
+    """Write a file with the numbers of a material and of a scalpel, and a comment on each.
+
+    Args:
+        path: The file; its name ends in .toml.
+        name: The material; None for the soft gel of the scenes.
+        force: Whether a file that exists is replaced.
+
+    Raises:
+        UsageError: there is no such material, another suffix, or the file exists and `force` is
+            not given.
+        RunError: the system refuses.
+    """
+    if path.suffix.lower() != SUFFIX:
+        raise UsageError(f"--write is {path}; its name must end in {SUFFIX}")
+    if name is None:
+        text = template(PHANTOM, "the soft gel of the scenes")
+    else:
+        (preset,) = chosen_presets(name)
+        text = template(preset.material, f"{preset.name}, {preset.about}", preset)
+    write_new_file(path, text, force=force, instead="another --write")
+
+
+def template(material: Material, about: str, preset: Preset | None = None) -> str:
+    """Return the text of a file with all numbers of a material and of a scalpel.
+
+    Args:
+        material: Gives the numbers of `[material]`.
+        about: What material it is, for the first line.
+        preset: Gives the sources of its figures; None without.
+    """
+    head = (
+        f"Start: {about}, and a scalpel. SI units. Use it with `--material FILE --blade FILE`, or "
+        "with one of the two. A key that is left out keeps the value of the scene; an option on "
+        "the command line, such as --young, overrides the key."
+    )
+    sources = {} if preset is None else preset.values
+    lines = [*_comment(head), "", "[material]", *_keys(MaterialTable, material, sources)]
+    lines += ["[blade]", *_keys(BladeTable, table_of_blade(SCALPEL), {})]
+    return "\n".join(lines[:-1]) + "\n"
+
+
+def _keys(
+    table: type[msgspec.Struct], values: object, sources: dict[str, SourcedValue]
+) -> list[str]:
+    """Return the lines of a table: for each key its meaning, its source and its value."""
+    lines = []
+    for key, text in texts_of(table).items():
+        lines += _comment(re.sub(r"\[([^]]+)\]\([^)]+\)", r"\1", text))  # links are for pages
+        if key in sources:
+            lines += _comment(_origin(sources[key]))
+        value = msgspec.to_builtins(getattr(values, key))
+        lines += [f"{key} = {tomlkit.item(value).as_string()}", ""]
+    return lines
+
+
+def _origin(figure: SourcedValue) -> str:
+    """Return how a figure was measured, and by whom."""
+    source = f" [{figure.source}]" if figure.source else ""
+    confirmed = "" if figure.is_confirmed else " (an estimate: not traced to a measurement)"
+    return f"Value: {figure.measured}{source}{confirmed}"
+
+
+def _comment(text: str) -> list[str]:
+    """Return the lines of a comment."""
+    return [f"# {line}" for line in textwrap.wrap(text, _WIDTH, break_on_hyphens=False)]

@@ -1,12 +1,14 @@
-"""The command `new`: writes a scene file to start from."""
+"""The command `new`: writes a scene file to start from, which replaces another only on request."""
 
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.runs.console import log_to_stderr
 from scalpel_sim.runs.options import OUTPUT, Flag, PrintOptions
+from tissue import new_whole_file, whole_file
 
 
 def new(
@@ -31,9 +33,8 @@ def new(
         scene: The scene that is written: one that comes with the project.
         force: Replace the file if it exists.
     """
-    from scalpel_sim.cli.new_file import write_new_file
-    from scalpel_sim.scene_file.reading import shipped_path, shipped_scene
-    from scalpel_sim.tables.toml import SUFFIX
+    from scalpel_sim.scene.read import shipped_path, shipped_scene
+    from scalpel_sim.scene.text_files import SUFFIX
 
     with log_to_stderr(printing):
         shipped_scene(scene)  # refuses an unknown one
@@ -42,3 +43,30 @@ def new(
         write_new_file(path, text, force=force, instead="another file")
         if not printing.quiet:
             print(f"{path}: written; run it with `scalpel-sim run {path}`")
+
+
+def write_new_file(path: Path, text: str, *, force: bool, instead: str) -> None:
+    """Write a text to a file that does not exist yet; an error leaves what was there.
+
+    Args:
+        path: The file.
+        text: What it is to hold.
+        force: Whether a file that exists is replaced.
+        instead: What to choose where the file cannot be written, for the message.
+
+    Raises:
+        UsageError: the file exists, and `force` is not given.
+        RunError: the system refuses.
+    """
+    placed = whole_file if force else new_whole_file
+    try:
+        with placed(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
+    except FileExistsError as error:
+        raise UsageError(
+            f"{path} exists already; choose another file, or add --force to replace it"
+        ) from error
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose {instead}"
+        ) from error

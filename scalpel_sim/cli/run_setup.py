@@ -3,26 +3,26 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
 from scalpel_sim.cli.options import ArmOptions, MaterialOptions, TissueOptions, given_options
-from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
+from scalpel_sim.cli.scene_options import chosen_scene, led_elsewhere, scene_in_file
 from scalpel_sim.cli.steps_of_frames import check_steps_of_frames
 from scalpel_sim.errors import Interrupted, UsageError
 from scalpel_sim.output.export import check_exports
-from scalpel_sim.preparation import prepare
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.preparation.tissue import check_scene, make_tissue
 from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.runs.options import SERVER_PATIENCE, ClientOptions, OutputOptions, PrintOptions
 from scalpel_sim.runs.prepared_run import PreparedRun, load_kernels
 from scalpel_sim.runs.run_folder import check_folder
-from scalpel_sim.scene_body import check_scene, make_tissue
-from scalpel_sim.scene_parts.scene import LONGEST_RUN, Scene, changed
-from scalpel_sim.scenes import scene_of
+from scalpel_sim.scene.checks import LONGEST_RUN
+from scalpel_sim.scene.scene import Scene, changed
+from scalpel_sim.scene.served import scene_of
+from scalpel_sim.scene.text_files import is_toml_file
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.tables.toml import is_toml_file
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -157,7 +157,7 @@ def _tissue_elsewhere(
     given = scene_in_file(name) if name is not None and is_toml_file(name) else None
     link = TcpLink(address, key=chosen_key(options.client.key), patience=SERVER_PATIENCE)
     try:
-        scene = changed(scene_of(link, given), **_changes_of_scene(options.arm))
+        scene = led_elsewhere(scene_of(link, given), options.arm)
         if given is None and name not in (None, scene.name):
             raise UsageError(f"{address} holds '{scene.name}', not '{name}'")
         check_folder(_folder(options.output, scene))
@@ -189,7 +189,7 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
 
     mesh = scene.mesh()
     if options.calibrate:
-        scene = replace(scene, material=calibrated(mesh, scene.material))
+        scene = changed(scene, material=calibrated(mesh, scene.material))
     error = spring_error(mesh, scene.material)
     return scene, {
         "springs": {
@@ -200,24 +200,6 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
             "poisson_ratio": error.relaxed.poisson_ratio,
             "calibration": scene.material.spring_calibration,
         }
-    }
-
-
-def _changes_of_scene(arm: ArmOptions) -> dict[str, Any]:
-    """Return the options of the arm that are fields of the scene."""
-    return {
-        name: getattr(arm, name)
-        for name in (
-            "stroke",
-            "speed",
-            "arm",
-            "tissue_every",
-            "coupling",
-            "coupling_stiffness",
-            "coupling_damping",
-            "passivity",
-            "seconds",
-        )
     }
 
 

@@ -1,61 +1,50 @@
 """The scene that the command line asks for: a file, the environment, `--set`, and the options."""
 
+import logging
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scalpel_sim.cli.material_file import read_blade, read_material, warn_of_unused_tables
 from scalpel_sim.cli.options import (
+    KEY_OF,
     ArmOptions,
     BladeOptions,
-    BodyOptions,
-    MaterialOptions,
-    SolverOptions,
     TissueOptions,
 )
-from scalpel_sim.cli.prony_series import series_of
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.blade import expect_faces
-from scalpel_sim.scene_file.build import scene_in
-from scalpel_sim.scene_file.layers import merged, with_environment, with_settings
-from scalpel_sim.scene_file.reading import SceneFile, read_scene_file, shipped_scene
-from scalpel_sim.scene_parts.choices import can_audit
-from scalpel_sim.scene_parts.scene import GEL, Scene
-from scalpel_sim.scenes import DEFAULT_SCENE
-from scalpel_sim.tables.material import given_in
-from scalpel_sim.tables.stroke import stroke_called
-from scalpel_sim.tables.toml import is_toml_file
+from scalpel_sim.scene.checks import can_audit
+from scalpel_sim.scene.read import (
+    DEFAULT_SCENE,
+    Given,
+    SceneFile,
+    located,
+    merged,
+    read_scene_file,
+    scene_in,
+    shipped_scene,
+    with_environment,
+    with_key,
+    with_settings,
+)
+from scalpel_sim.scene.scene import GEL, Scene, changed, given_in
+from scalpel_sim.scene.schema import BladeTable, MaterialTable
+from scalpel_sim.scene.strokes import stroke_called
+from scalpel_sim.scene.text_files import as_tables, is_toml_file, read_toml
+from scalpel_sim.scene.values import TomlTable
 
-OptionGroup = BodyOptions | MaterialOptions | SolverOptions | ArmOptions
-"""Options that are keys of a scene, each by itself."""
+_log = logging.getLogger("scalpel_sim")
 
-_KEYS = {
-    "fix": "body.fixed",
-    "stretch": "body.stretch",
-    "gravity": "world.gravity",
-    "floor": "world.floor",
-    "young": "material.young_modulus",
-    "arm": "arm.preset",
-    "seconds": "seconds",
-}
-"""Keys of a scene that options set whose names are others."""
+_HOW_TO_WRITE_ONE = "`scalpel-sim materials --write FILE.toml` writes a file to start from"
 
-_BLADE_KEYS = {
-    "blade_thickness": "thickness",
-    "blade_bevel": "bevel_degrees",
-    "blade_height": "height",
-    "blade_edge_radius": "edge_radius",
-}
-"""Keys of `[blade]` that options set, thickness first."""
 
-_TABLE_OF = {MaterialOptions: "material", SolverOptions: "solver", ArmOptions: "arm"}
-"""The table of the other options of a group, whose keys have their names."""
+class _MaterialFile(TomlTable, kw_only=True, frozen=True):
+    """A file of figures of a material and a blade."""
 
-_NO_KEYS = ("mesh", "scale", "material", "calibrate", "spring_error", "stroke", "speed")
-"""Options that are no single key of a scene."""
+    material: MaterialTable | None = None
+    blade: BladeTable | None = None
 
 
 def chosen_scene(
@@ -70,37 +59,33 @@ def chosen_scene(
 
     Args:
         name: A scene that comes with the project, or a FILE.toml; None for the default one.
-        tissue: What the command line asks for of body, material, blade and solver.
-        arm: What it asks for of the arm and the strokes.
-        relaxation: How the motion is advanced where nothing is said of it, and the tissue does not
+        tissue: Options of body, material, blade and solver.
+        arm: Options of the arm and the strokes.
+        relaxation: How the motion is advanced where no layer gives it, and the tissue does not
             stiffen; None: as the scene has it.
-        audits: Whether an account of the energy is kept where nothing is said of it.
+        audits: Whether an account of the energy is kept where no layer gives it.
 
     Raises:
         MeshError: the mesh cannot be cut.
         UsageError: there is no such scene, a key or a value is wrong, or they make no sense
             together.
     """
-    body, material, blade = tissue.body, tissue.material, tissue.blade
-    file = _scene_or_mesh(name, body.mesh, body.scale)
+    file = _scene_or_mesh(name, tissue.body.mesh, tissue.body.scale)
     file = with_settings(with_environment(file, os.environ), tissue.settings)
-    _warn_of_unused_tables(material, blade)
-    file = _with_material(file, material.material)
-    file = _with_blade(file, blade)
+    file = _with_figures(located(file), tissue.material.material, tissue.blade)
     file = _with_strokes(file, arm)
-    for group in (body, material, tissue.solver, arm):
-        file = _with_options(file, group)
-    try:
-        scene = scene_in(file)
-    except UsageError as error:
-        raise _with_path(error, name, material.material, blade.blade) from error
-    expect_faces(scene.blade, vars(material))
-    solver = file.content.get("solver", {})
+    given = _given_keys(tissue, arm)
+    for option, value in given.items():
+        source = Given(f"--{option.replace('_', '-')}", value)
+        file = with_key(file, KEY_OF[option].split("."), _parsed(option, value), source)
+    scene = scene_in(file)
+    expect_faces(scene.blade, given)
+    solver, how = file.content.get("solver", {}), dict[str, Any]()
     if relaxation is not None and "relaxation" not in solver and not scene.material.stiffens:
-        scene = replace(scene, relaxation=relaxation)
-    if audits and "audit" not in solver and can_audit(scene.relaxation):
-        scene = replace(scene, audit=True)
-    return scene
+        how["relaxation"] = relaxation
+    if audits and "audit" not in solver:
+        how["audit"] = can_audit(how.get("relaxation", scene.solver.relaxation))
+    return changed(scene, **how)
 
 
 def scene_in_file(path: str) -> Scene:
@@ -109,9 +94,42 @@ def scene_in_file(path: str) -> Scene:
     Raises:
         UsageError: the file cannot be read, or a key or a value is wrong.
     """
-    file = with_environment(read_scene_file(Path(path)), os.environ)
+    return scene_in(with_environment(read_scene_file(Path(path)), os.environ))
+
+
+def led_elsewhere(scene: Scene, arm: ArmOptions) -> Scene:
+    """Return a scene whose tissue is in another process, with the options of the arm.
+
+    Raises:
+        UsageError: a value is wrong.
+    """
+    given = {name: value for name, value in vars(arm).items() if value is not None}
+    return changed(
+        scene, **{KEY_OF.get(name, name).split(".")[-1]: value for name, value in given.items()}
+    )
+
+
+def read_figures(path: Path, table: str) -> dict[str, Any]:
+    """Return the figures of a material or a blade that a file gives.
+
+    Args:
+        path: The file.
+        table: `material` or `blade`.
+
+    Raises:
+        UsageError: the file cannot be read, has no such table, or a key or value is wrong.
+    """
+    found = getattr(_read(path), table)
+    if found is None:
+        raise UsageError(f"{path} has no table [{table}]; {_HOW_TO_WRITE_ONE}")
+    return given_in(found)
+
+
+def _read(path: Path) -> _MaterialFile:
+    """Return what is in a file of figures."""
+    content = read_toml(path, _HOW_TO_WRITE_ONE)
     try:
-        return scene_in(file)
+        return as_tables(content, _MaterialFile)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
 
@@ -137,97 +155,108 @@ def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> 
     return SceneFile(content, mesh.stem, Path())
 
 
-def _warn_of_unused_tables(material: MaterialOptions, blade: BladeOptions) -> None:
-    """Log a warning where a file has a table that no option asks for."""
-    name = material.material
-    is_file = name is not None and is_toml_file(name)
-    # A material by name is a choice, which a `[material]` beside the blade does not question.
-    if name is None or is_file:
-        warn_of_unused_tables(Path(name) if name is not None else None, blade.blade)
-
-
-def _with_material(file: SceneFile, material: str | None) -> SceneFile:
-    """Return a scene with the material by name, or with what a file of one gives."""
-    content = file.content
-    if material is not None and is_toml_file(material):
-        content = merged(content, {"material": read_material(Path(material))})
+def _with_figures(file: SceneFile, material: str | None, blade: BladeOptions) -> SceneFile:
+    """Return a scene with a material by name, or figures of files, and the measures of a blade."""
+    content, origins = dict(file.content), dict[str, str]()
+    is_file = material is not None and is_toml_file(material)
+    # A material by name is a choice, which a `[material]` near the blade does not question.
+    if material is None or is_file:
+        _warn_of_unused_tables(None if material is None else Path(material), blade.blade)
+    if material is not None and is_file:
+        content = merged(content, {"material": read_figures(Path(material), "material")})
+        origins["material"] = material
     elif material is not None:
-        content = {**content, "material": {"preset": material}}
-    return file._replace(content=content)
+        content["material"] = {"preset": material}
+    in_file: dict[str, Any] = {}
+    if blade.blade is not None:
+        in_file = read_figures(blade.blade, "blade")
+        origins["blade"] = str(blade.blade)
+    given = _given_measures(blade)
+    if in_file or given:
+        content["blade"] = _measures(content.get("blade", {}), in_file | given)
+    return file._replace(content=content, origins=origins)
 
 
-def _with_blade(file: SceneFile, options: BladeOptions) -> SceneFile:
-    """Return a scene with the measures of the blade in a file, and those of the options.
+def _given_measures(blade: BladeOptions) -> dict[str, Any]:
+    """Return the keys of `[blade]` that options give.
 
-    Measures of a blade with faces turn a line into a scalpel. A thickness of 0 makes a line, on
-    which the other measures of the file do not act.
+    Raises:
+        UsageError: a line is chosen, and a measure of a body with it.
     """
-    in_file = {} if options.blade is None else read_blade(options.blade)
-    given = {key: getattr(options, option) for option, key in _BLADE_KEYS.items()}
-    given = {key: value for key, value in given.items() if value is not None}
-    if not (in_file or given):
-        return file
-    if given.get("thickness") == 0.0 and len(given) > 1:
-        option = next(option for option, key in _BLADE_KEYS.items() if key in list(given)[1:])
+    options = {name: value for name, value in vars(blade).items() if value is not None}
+    options.pop("blade", None)
+    if options.get("blade_thickness") == 0.0 and len(options) > 1:
+        other = next(name for name in options if name != "blade_thickness")
         raise UsageError(
-            f"--{option.replace('_', '-')} is about a blade with faces, and --blade-thickness 0 is "
+            f"--{other.replace('_', '-')} is about a blade with faces, and --blade-thickness 0 is "
             "a line; omit one of them"
         )
-    measures = in_file | given
-    if measures.get("thickness") == 0.0:
-        measures = {"thickness": 0.0}
-    usual = dict(file.content.get("blade", {}))
-    if usual.get("thickness") == 0.0 or measures.get("thickness") == 0.0:
-        usual = {}
-    return file._replace(content={**file.content, "blade": usual | measures})
+    return {KEY_OF[name].partition(".")[2]: value for name, value in options.items()}
+
+
+def _measures(usual: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the table `[blade]` of a scene with some measures replaced.
+
+    Measures of a blade with faces turn a line into a scalpel. A thickness of 0 makes a line, on
+    which the other measures of a file do not act.
+    """
+    if given.get("thickness") == 0.0:
+        return {"thickness": 0.0}
+    is_line = not isinstance(usual, dict) or usual.get("thickness") == 0.0
+    return given if is_line else usual | given
+
+
+def _warn_of_unused_tables(material: Path | None, blade: Path | None) -> None:
+    """Log a warning where a file has a table that no option asks for."""
+    if material is not None and blade is None and _read(material).blade is not None:
+        _log.warning("%s: its [blade] is not used; add --blade %s to use it", material, material)
+    if blade is not None and material is None and _read(blade).material is not None:
+        _log.warning("%s: its [material] is not used; add --material %s to use it", blade, blade)
 
 
 def _with_strokes(file: SceneFile, arm: ArmOptions) -> SceneFile:
-    """Return a scene with the stroke that is asked for, and its speed."""
+    """Return a scene with the stroke that options give, and its speed."""
+    if arm.stroke is None and arm.speed is None:
+        return file
     rows = file.content.get("stroke", [{}])
     if arm.stroke is not None:
-        row = given_in(stroke_called(arm.stroke))
-        if "file" in row and file.folder != Path():
-            row["file"] = str(Path(row["file"]).absolute())
-        rows = [row]
+        rows = [given_in(stroke_called(arm.stroke))]
+    file = file._replace(content={**file.content, "stroke": rows})
     if arm.speed is not None:
-        rows = [row if "file" in row else row | {"speed": arm.speed} for row in rows]
-    return file if rows == [{}] else file._replace(content={**file.content, "stroke": rows})
-
-
-def _with_options(file: SceneFile, group: OptionGroup) -> SceneFile:
-    """Return a scene with the keys that a group of options gives.
-
-    Raises:
-        UsageError: a value is wrong; the message names the option.
-    """
-    for option, given in vars(group).items():
-        if given is None or option in _NO_KEYS:
-            continue
-        value: Any = series_of(given) if option == "prony" else given
-        key = _KEYS.get(option) or f"{_TABLE_OF[type(group)]}.{option}"
-        changes: Any = value
-        for part in reversed(key.split(".")):
-            changes = {part: changes}
-        changed = file._replace(content=merged(file.content, changes))
-        try:
-            changed.tables()
-        except UsageError as error:
-            remedy = str(error).partition("; ")[2]
-            raise UsageError(f"--{option.replace('_', '-')} is {given}; {remedy}") from error
-        file = changed
+        given = Given("--speed", arm.speed)
+        for i, row in enumerate(rows):
+            if "file" not in row:
+                file = with_key(file, ["stroke", str(i), "speed"], arm.speed, given)
     return file
 
 
-def _with_path(
-    error: UsageError, scene: str | None, material: str | None, blade: Path | None
-) -> UsageError:
-    """Return an error that names the file from which the wrong table came, if one did."""
-    text = str(error)
-    if text.startswith("[material]") and material is not None and is_toml_file(material):
-        return UsageError(f"{material}: {text}")
-    if text.startswith("[blade]") and blade is not None:
-        return UsageError(f"{blade}: {text}")
-    if scene is not None and is_toml_file(scene):
-        return UsageError(f"{scene}: {text}")
-    return error
+def _given_keys(tissue: TissueOptions, arm: ArmOptions) -> dict[str, Any]:
+    """Return the options that are keys of a scene, and their values."""
+    groups = (tissue.body, tissue.material, tissue.blade, tissue.solver, arm)
+    return {
+        name: value
+        for group in groups
+        for name, value in vars(group).items()
+        if name in KEY_OF and value is not None
+    }
+
+
+def _parsed(option: str, value: Any) -> Any:
+    """Return the value of an option as a file has it.
+
+    Raises:
+        UsageError: the text is no Prony series, `0.3:0.1,0.2:5`.
+    """
+    if option != "prony":
+        return value
+    pairs = []
+    for term in value.split(","):
+        share, _, time = term.partition(":")
+        try:
+            pairs.append([float(share), float(time)])
+        except ValueError:
+            raise UsageError(
+                f"--prony has the term '{term}'; write g:tau for each, separated by commas, such "
+                "as 0.3:0.1,0.2:5"
+            ) from None
+    return pairs

@@ -14,8 +14,8 @@ from scalpel_sim.runs.options import PrintOptions
 from tissue import whole_file
 
 if TYPE_CHECKING:  # `--help` should not wait for it
-    from scalpel_sim.cases.case_file import CaseFile
-    from scalpel_sim.cases.recording import CaseRecord
+    from scalpel_sim.scene.case import CaseContent
+    from scalpel_sim.validate.cases.runner import CaseRecord
     from scalpel_sim.validate.findings import ValidationScene
     from scalpel_sim.validate.results import SceneRun
 
@@ -47,7 +47,7 @@ def validate(
     ```
 
     Args:
-        case: Run the case in this FILE.toml (docs/cases.md) instead of the scenes.
+        case: Run the case in this FILE.toml (docs/scenes.md) instead of the scenes.
         out: Folder for the report, its data and the plots; out/validate by default, with a case
             out/ and the name of its file.
         only: Only this scene; may be given several times. beam, stretch, steady,
@@ -97,11 +97,11 @@ def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
         RunError: the run failed, or a file cannot be written.
         CheckError: what the case expects is missed.
     """
-    from scalpel_sim.cases.case_file import read_case
-    from scalpel_sim.cases.expected import check_expected, curves_of
-    from scalpel_sim.cases.report import CaseFindings, case_as_json, print_case, write_case
     from scalpel_sim.output.summary import versions
     from scalpel_sim.runs.run_folder import make_folder
+    from scalpel_sim.scene.case import read_case
+    from scalpel_sim.validate.cases.expected import check_expected, curves_of
+    from scalpel_sim.validate.cases.report import CaseFindings, case_as_json, print_case, write_case
 
     case = read_case(path)
     curves = curves_of(case)
@@ -109,7 +109,7 @@ def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
     with log_to_stderr(printing):
         started = time.perf_counter()
         record = _run_case(case, printing)
-        expected = zip(case.content.expected, curves, strict=True)
+        expected = zip(case.expected, curves, strict=True)
         checks = [check_expected(each, curve, record) for each, curve in expected]
         found = CaseFindings(case, record, checks, curves, time.perf_counter() - started)
         files = write_case(out, found, versions())
@@ -124,10 +124,9 @@ def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
         raise CheckError(f"{path}: what it expects is missed; see {out / files[0]}")
 
 
-def _run_case(case: "CaseFile", printing: PrintOptions) -> "CaseRecord":
+def _run_case(case: "CaseContent", printing: PrintOptions) -> "CaseRecord":
     """Run a case; say from time to time how far it is."""
-    from scalpel_sim.cases.assembly import assemble
-    from scalpel_sim.cases.recording import run_case
+    from scalpel_sim.validate.cases.runner import assemble, run_case
 
     gc.enable()  # a start runs without it
     said = time.monotonic()
@@ -136,10 +135,10 @@ def _run_case(case: "CaseFile", printing: PrintOptions) -> "CaseRecord":
         nonlocal said
         if not printing.quiet and time.monotonic() - said > _SECONDS_PER_LINE:
             said = time.monotonic()
-            say(f"{seconds:.3g} of {case.content.run.seconds:.3g} s")
+            say(f"{seconds:.3g} of {case.run.seconds:.3g} s")
 
     if not printing.quiet:
-        say(f"{case.content.title}: {case.content.run.seconds:g} s")
+        say(f"{case.title}: {case.run.seconds:g} s")
     return run_case(case, assemble(case), report)
 
 

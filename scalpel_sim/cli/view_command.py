@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
+from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions, with_values
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.console import log_to_stderr
 from scalpel_sim.runs.options import (
@@ -82,7 +82,7 @@ def _changed(tissue: TissueOptions, asked: "Begin") -> TissueOptions:
     if asked.material is not None:
         material = replace(material, material=asked.material)
     if asked.toughness is not None:
-        material = replace(material, toughness=asked.toughness)
+        material = with_values(material, toughness=asked.toughness)
     if asked.blade_thickness is not None:
-        blade = replace(blade, blade_thickness=asked.blade_thickness)
+        blade = with_values(blade, blade_thickness=asked.blade_thickness)
     return replace(tissue, material=material, blade=blade)

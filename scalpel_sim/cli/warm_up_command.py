@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from scalpel_sim.cli.options import TissueOptions
 from scalpel_sim.errors import RunError
 from scalpel_sim.runs.console import compiling, log_to_stderr
 from scalpel_sim.runs.options import PrintOptions
+from scalpel_sim.scene.scene import changed
 
 if TYPE_CHECKING:  # `--help` should not wait for a compiler
     from scalpel_sim.runs.warm_up import KernelSet
@@ -38,7 +38,7 @@ def warm_up(
     """
     with log_to_stderr(printing):
         from scalpel_sim.runs.warm_up import compile_ahead, kernels_are_compiled
-        from scalpel_sim.scenes import SCENES
+        from scalpel_sim.scene.read import SCENES
 
         every = "all" in scenes
         chosen: Sequence[str | None] = list(SCENES) if every else scenes or (None,)
@@ -61,16 +61,17 @@ def _sets(names: Sequence[str | None], tissue: TissueOptions) -> list["KernelSet
     """
     from scalpel_sim.cli.scene_options import chosen_scene
     from scalpel_sim.runs.warm_up import KernelSet
-    from scalpel_sim.scene_parts.choices import can_audit
+    from scalpel_sim.scene.checks import can_audit
 
     found: dict[KernelSet, None] = {}
     for name in names:
         scene = chosen_scene(name, tissue)
-        audits = (True, False) if can_audit(scene.relaxation) else (False,)
-        if tissue.solver.audit is not None:
-            audits = (tissue.solver.audit,)
+        audits = (True, False) if can_audit(scene.solver.relaxation) else (False,)
+        audit = vars(tissue.solver)["audit"]
+        if audit is not None:
+            audits = (audit,)
         for audit in audits:
-            found[KernelSet.of(replace(scene, audit=audit))] = None
+            found[KernelSet.of(changed(scene, audit=audit))] = None
     return list(found)
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from tissue import FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -42,11 +42,11 @@ def figure(
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.output.export import check_file
-    from scalpel_sim.scene_parts.choices import check_scheme
+    from scalpel_sim.scene.checks import SCHEMES, check_choice
 
     path = output or Path(f"figure{number}.png")
     with log_to_stderr(printing):
-        check_scheme(scheme)
+        check_choice("scheme", scheme, SCHEMES)
         check_file(path, ".png", "--output")
         from scalpel_sim.figures.figures import draw_figure
         from scalpel_sim.figures.organ import draw_organ

@@ -1,12 +1,12 @@
 """The cuts of the paper's figures, and the state of body and scalpel at some moments of them."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from scalpel_sim.planned_cut import PlannedCut, prepare_cut
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.model_shapes import Shape, body_poses, shapes_of
 from scalpel_sim.viewer.primitives import TriangleMesh
@@ -21,7 +21,7 @@ TOOL = ("blade", "stylus", "shaft", "jaw_low", "jaw_high")
 """Ends of the names of bodies of arms that are drawn; the others would hide the cut."""
 
 FIGURE_10 = PlannedCut(
-    replace(SCENES["slab"], stretch=STRETCH),
+    changed(SCENES["slab"], stretch=STRETCH),
     path=np.array([[0.4, -0.2], [0.62, 1.5]]),
     depth=0.7,
     lean=0.12,
@@ -33,14 +33,14 @@ FIGURE_10_MOMENTS = (0.0, 0.35, 0.65, 1.0)
 
 FIGURE_12 = (
     PlannedCut(
-        replace(SCENES["grid2"], stretch=STRETCH),
+        changed(SCENES["grid2"], stretch=STRETCH),
         path=np.array(
             [[0.15, -0.3], [0.3, 0.0], [0.62, 0.45], [0.55, 0.8], [0.3, 1.1], [-0.2, 1.5]]
         ),
         depth=0.75,
     ),
     PlannedCut(
-        replace(SCENES["grid7"], stretch=STRETCH),
+        changed(SCENES["grid7"], stretch=STRETCH),
         path=np.array(
             [[0.5, -0.25], [0.35, 0.15], [0.45, 0.45], [0.65, 0.7], [0.55, 1.0], [0.4, 1.6]]
         ),
@@ -64,7 +64,7 @@ class Moment(NamedTuple):
 
 def with_scheme(scheme: str, cut: PlannedCut) -> PlannedCut:
     """Return the cut with another cutting scheme: `stellar` or `paper`."""
-    return cut._replace(scene=replace(cut.scene, scheme=scheme))
+    return cut._replace(scene=changed(cut.scene, scheme=scheme))
 
 
 def moments(cut: PlannedCut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]:

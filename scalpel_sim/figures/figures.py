@@ -23,7 +23,7 @@ from scalpel_sim.figures.cuts import (
 from scalpel_sim.figures.mesh_drawing import draw_mesh
 from scalpel_sim.figures.rendering import SceneObject, render, texture_of
 from scalpel_sim.figures.table import table_below
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.textures import map_texture

@@ -1,6 +1,5 @@
 """The organ of the scenes as one picture: two moments of a cut through it, side by side."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,11 @@ from PIL import Image
 from scalpel_sim.figures.cuts import moments, with_scheme
 from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, figure_file, picture, view_of
 from scalpel_sim.planned_cut import PlannedCut
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.scene import changed
 
 ORGAN = PlannedCut(
-    replace(SCENES["organ"], stretch=0.15, table=None),
+    changed(SCENES["organ"], stretch=0.15, table=None),
     path=np.array([[0.55, -0.15], [0.42, 1.25]]),
     depth=1.15,
     lean=-0.15,

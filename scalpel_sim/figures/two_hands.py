@@ -7,8 +7,8 @@ from PIL import Image
 
 from scalpel_sim.figures.cuts import Moment, tool_of
 from scalpel_sim.figures.figures import GAP, WITH_TOOL, Drawn, figure_file, picture, view_of
-from scalpel_sim.preparation import prepare
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.scene.read import SCENES
 from scalpel_sim.simulation import Simulation
 
 TWO_HANDS = {"retract": (3.6, 4.2), "excise": (1.75, 3.3), "taut_incision": (2.4, 3.2)}

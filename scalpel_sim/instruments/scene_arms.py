@@ -23,8 +23,7 @@ from scalpel_sim.arm.standing import Standing, StandingFixture, Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.own_arm import move_to_start, move_within, own_arm
 from scalpel_sim.instruments.scene_graspers import arms_with_graspers
-from scalpel_sim.scene_parts.own_arm_settings import OwnArm
-from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scene.scene import Scene
 from scalpel_sim.strokes.expected_force import ExpectedForce
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.sequence import lengthened
@@ -120,8 +119,7 @@ def own_arm_in(
     Raises:
         ValueError: it cannot be read, or does not reach.
     """
-    assert scene.own_arm is not None
-    arm, frame = _own(scene.own_arm)
+    arm, frame = _own(scene)
     stroke = _as_long(stroke, arm.blade.length)
     room = _moved(arm, stroke, frame, workspace_in(scene, stroke.start, around.boxes[0]))
     rooms = _rooms_of_graspers(motions, scene, around)
@@ -132,7 +130,7 @@ def own_arm_in(
     ]
     if others:
         start = np.array(arm.data.qpos)
-        arm, _ = _own(scene.own_arm, others)
+        arm, _ = _own(scene, others)
         arm.reset(start)
     return StandingArms(arm, frame, stroke, others, room)
 
@@ -170,7 +168,7 @@ def _placed(
         beside: Places the arms beside it.
     """
     if not stroke.is_led:
-        placement = place(stroke, boxes, scene.arm, force=needed.force)
+        placement = place(stroke, boxes, scene.arm.preset, force=needed.force)
         return placement, beside(placement), None
     start = stroke.start
     workspace, middle = workspace_in(scene, start, boxes[0]), 0.5 * (start.tip + start.heel)
@@ -178,7 +176,7 @@ def _placed(
     def place_for(shares: FloatArray) -> tuple[Placement, list[HeldArm], FloatArray]:
         box = shrunk(workspace, middle, shares)
         tour = tour_of(box, middle, start)
-        name = arm_for(scene.arm, shares)
+        name = arm_for(scene.arm.preset, shares)
         found = place_if_reached(tour, boxes, name, force=needed.force)
         if found is None:
             raise PlacementError(f"arm {name}")
@@ -246,8 +244,10 @@ def _in_world(around: ArmSurroundings, frame: TissueFrame) -> list[Standing]:
     return found if around.table is None else [around.table._replace(frame=frame), *found]
 
 
-def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[DrivenArm, TissueFrame]:
+def _own(scene: Scene, others: Sequence[Standing] = ()) -> tuple[DrivenArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world."""
+    own, world = scene.arm, scene.world
+    assert own.model is not None
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
     arm = own_arm(
         Path(own.model),
@@ -257,11 +257,11 @@ def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[DrivenArm, Tissu
         forward=own.forward,
         others=others,
     )
-    quaternion, axes = np.array(own.quat), np.empty(9)
+    quaternion, axes = np.array(world.quat), np.empty(9)
     if not quaternion.any():
         raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
     mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
-    return arm, TissueFrame(axes.reshape(3, 3), np.array(own.pos))
+    return arm, TissueFrame(axes.reshape(3, 3), np.array(world.pos))
 
 
 def workspace(
@@ -295,7 +295,7 @@ def workspace_in(
         bounds: Lowest and highest corner of the body [m].
         room: How far the tip may be beside it [m].
     """
-    stops = [height for height in (scene.table, scene.floor) if height is not None]
+    stops = [height for height in (scene.world.table, scene.world.floor) if height is not None]
     return workspace(start, bounds, max(stops, default=-math.inf), room)
 
 

@@ -17,10 +17,10 @@ from scalpel_sim.instruments.second_arm import (
     place_of_grasper,
     preset_with_grasper,
 )
+from scalpel_sim.scene.schema import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
 from scalpel_sim.strokes.recorded_grasp import grasp_from_csv
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.tables.grasper import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
 from tissue import FloatArray
 
 WATCHED_INSTANTS = 33

@@ -22,7 +22,7 @@ from scalpel_sim.runs.console import print_report, say, stay_while
 from scalpel_sim.runs.options import DeviceOptions, PageOptions
 from scalpel_sim.runs.prepared_run import PreparedRun, perform_by_hand
 from scalpel_sim.runs.stop_signals import StopSignals
-from scalpel_sim.scene_parts.scene import LONGEST_RUN
+from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.viewer.messages import PageControls
 from scalpel_sim.viewer.pictures import show_run
 from scalpel_sim.viewer.viewer import Viewer

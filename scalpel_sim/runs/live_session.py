@@ -20,8 +20,8 @@ from scalpel_sim.runs.console import SECONDS_PER_CHECK, print_report, say
 from scalpel_sim.runs.options import PageOptions
 from scalpel_sim.runs.prepared_run import PreparedRun, perform_by_hand, perform_script
 from scalpel_sim.runs.stop_signals import StopSignals
-from scalpel_sim.scene_parts.scene import LONGEST_RUN
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.scene.checks import LONGEST_RUN
+from scalpel_sim.scene.read import SCENES
 from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.pictures import show_run
 from scalpel_sim.viewer.viewer import Viewer

@@ -15,7 +15,8 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import loading
 from scalpel_sim.runs.warm_up import USUAL_SETS, KernelSet, prepare_kernels
-from scalpel_sim.scene_parts.scene import LONGEST_RUN, Scene
+from scalpel_sim.scene.checks import LONGEST_RUN
+from scalpel_sim.scene.scene import Scene
 from scalpel_sim.simulation import Simulation
 
 

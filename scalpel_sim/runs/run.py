@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +20,12 @@ from scalpel_sim.runs.run_checkpoints import RunCheckpoints
 from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
-from scalpel_sim.scene_file.writing import relative_path, scene_text
-from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scene.scene import Scene
+from scalpel_sim.scene.schema import ViewTable
+from scalpel_sim.scene.strokes import StrokeTable
+from scalpel_sim.scene.write import relative_path, scene_text
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import asked_area
-from scalpel_sim.tables.stroke import StrokeTable
-from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
 
@@ -304,7 +303,7 @@ def _scene_to_write(
         structs.replace(each, motion=[], recorded=str(outputs.path(grasp_file(each.name))))
         for each in scene.graspers
     ]
-    return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
+    return structs.replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
 
 
 def _sums_of_recorded(scene: Scene, outputs: Outputs) -> dict[str, FileSum]:

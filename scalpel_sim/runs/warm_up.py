@@ -26,8 +26,8 @@ from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.recording.force_parts import force_parts
 from scalpel_sim.recording.frame_row import FrameRows, WallTimes
 from scalpel_sim.runs.stop_signals import SignalInterrupt, StopSignals
-from scalpel_sim.scene_parts.scene import Scene
-from scalpel_sim.scenes import PARENCHYMA, PHANTOM
+from scalpel_sim.scene.read import PARENCHYMA, PHANTOM
+from scalpel_sim.scene.scene import Scene
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
     BladeSegment,
@@ -78,14 +78,14 @@ class KernelSet(NamedTuple):
     def of(cls, scene: Scene) -> "KernelSet":
         """Return the set that a scene needs."""
         has_sides = scene.blade is not None
-        law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
-        how = (scene.audit, has_sides, scene.precision)
+        law, solver = scene.material.law, scene.solver
+        how = (solver.audit, has_sides, solver.precision)
         relaxes = bool(scene.material.prony)
         is_held = bool(scene.attachments) or any(
             grasper.holds == "attachment" for grasper in scene.graspers
         )
-        has_table = scene.table is not None or bool(scene.graspers)
-        return cls(law, scheme, relaxation, *how, relaxes, is_held, has_table)
+        has_table = scene.world.table is not None or bool(scene.graspers)
+        return cls(law, solver.scheme, solver.relaxation, *how, relaxes, is_held, has_table)
 
     @property
     def _prony(self) -> tuple[tuple[float, float], ...]:

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.stroke import Stroke, from_csv
 from scalpel_sim.strokes.timing import SAMPLE, SPEED_UP_TIME, timed
-from scalpel_sim.tables.stroke import StrokeTable
 from tissue import BladeSegment, FloatArray
 
 _UP = (0.0, 0.0, 1.0)

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from scalpel_sim.errors import unknown
+from scalpel_sim.scene.strokes import DEFAULT_SPEED, PLANNED_STROKES
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.expected_force import is_inside
 from scalpel_sim.strokes.incision import DRAG_SHARE, INSERTED_AT, WITHDRAWN_AT, plan_incision
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
-from scalpel_sim.tables.stroke import DEFAULT_SPEED, PLANNED_STROKES
 from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
 
 TILT = math.radians(25.0)

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Sequence
 
+from scalpel_sim.scene.strokes import DEFAULT_SPEED, PLANNED_STROKES, StrokeTable
 from scalpel_sim.strokes.drawn import drawn_stroke
 from scalpel_sim.strokes.incision import INSERTED_AT, WITHDRAWN_AT
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.tables.stroke import DEFAULT_SPEED, PLANNED_STROKES, StrokeTable
 from tissue import Material, TetrahedralMesh
 
 

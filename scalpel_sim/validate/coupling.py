@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.preparation import prepare
-from scalpel_sim.scene_parts.scene import changed
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.validate.findings import (
@@ -36,7 +36,9 @@ _TAP_RATE = 10.0
 """Taps per second [Hz]."""
 _HANDS = ("holds", "lets go", "taps")
 """What the hand does after the press."""
-_PRESS = changed(SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, arm="touch", speed=0.2)
+_PRESS = changed(
+    SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, preset="touch", speed=0.2
+)
 """A blade of 38 mm on a block of 10 kPa."""
 _UJ_PER_J = 1e6
 

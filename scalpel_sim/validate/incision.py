@@ -1,14 +1,14 @@
 """An incision in liver as published, on two meshes: first cut, distance ahead, force, and area."""
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.preparation import prepare
+from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.runs.run import REST_AFTER_STROKE
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.strokes.incision import DEPTH, SLOPE
@@ -27,7 +27,7 @@ from scalpel_sim.validate.findings import (
 )
 from tissue import FloatArray, Snapshot, TetrahedralMesh, liver_lobe
 
-_SCENE = replace(SCENES["incision"], audit=True)
+_SCENE = changed(SCENES["incision"], audit=True)
 """The organ on its underside, of liver as published; an arm draws a scalpel along it."""
 _TOUGHNESS = _SCENE.material.toughness
 """Toughness of liver [J/m2]."""
@@ -116,7 +116,7 @@ def rest_of(points: FloatArray, body: Snapshot) -> FloatArray:
 
 def draw_incision(mesh: TetrahedralMesh) -> DrawnIncision:
     """Draw the incision of the scene in an organ of that mesh."""
-    simulation = prepare(replace(_SCENE, mesh=lambda: mesh))
+    simulation = prepare(changed(_SCENE, mesh=lambda: mesh))
     asked = asked_area(simulation.stroke, simulation.link.snapshot())
     assert asked is not None
     ahead: list[float] = []

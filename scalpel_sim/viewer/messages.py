@@ -8,7 +8,7 @@ import msgspec
 
 from bridge import TissueFrame
 from scalpel_sim.hands.commands import Command
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity

@@ -12,7 +12,7 @@ import mujoco
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError
 from scalpel_sim.recording.growing_file import FileSum
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
 from scalpel_sim.viewer.messages import NO_VALUES, SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of

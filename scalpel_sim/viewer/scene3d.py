@@ -20,7 +20,7 @@ import numpy as np
 
 from scalpel_sim.recording.force_parts import ForceParts
 from scalpel_sim.recording.recording import TERMS
-from scalpel_sim.tables.view import DEFAULT_FOV
+from scalpel_sim.scene.schema import DEFAULT_FOV
 from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 

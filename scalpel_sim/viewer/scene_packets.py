@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.messages import NO_VALUES
 from scalpel_sim.viewer.model_shapes import Shape

@@ -18,7 +18,7 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Release, command_of
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.colouring import wanted_of
 from scalpel_sim.viewer.messages import (
     NO_VALUES,

@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,14 +22,15 @@ from scalpel_sim import SCENES, Simulation, Viewer, prepare
 from scalpel_sim.bench.random_strokes import random_stroke
 from scalpel_sim.hands.commands import Engage, Move, Turn
 from scalpel_sim.hands.teleoperation import LiveHand
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.viewer.pictures import into_viewer
 from tests.long.child import memory_of_this_process
 from tissue import BladeSweep, Energies, FloatArray, Tissue, block
 
 ROOT = Path(__file__).parents[2]
 
-SCENE = replace(
+SCENE = changed(
     SCENES["grid2"], mesh=partial(block, (3, 4, 3), (0.04, 0.04, 0.04)), floor=-0.02, audit=True
 )
 """A block of 216 tetrahedra that is held at its sides, as in the paper, above a floor."""

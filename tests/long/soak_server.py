@@ -3,7 +3,7 @@
 from functools import partial
 
 from bridge import serve
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
 from tests.long.soak import SCENE
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from bridge import CouplingError
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.arm.arm import ARMS, ArmError
 from scalpel_sim.arm.blade import BladeError
+from scalpel_sim.scene.scene import changed
 from tests import faults
 from tests.battery import battery
 from tissue import TissueError, Wrench
@@ -40,7 +41,7 @@ def simulation_at(scene, relaxation, law, audit, share):
     """Return a simulation that has done a share of its stroke, and its state."""
     ratio = 0.25 if law == "springs" else 0.45
     material = replace(SCENES[scene].material, law=law, poisson_ratio=ratio)
-    of = replace(SCENES[scene], relaxation=relaxation, material=material, audit=audit)
+    of = changed(SCENES[scene], relaxation=relaxation, material=material, audit=audit)
     simulation = prepare(of)
     simulation.run(share * simulation.duration)
     return simulation, simulation.save_state()

@@ -4,7 +4,7 @@ import numpy as np
 
 from scalpel_sim import SCENES, SimulationState, prepare
 from scalpel_sim.recording.recording import WALL_TIMES
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from tests.battery import battery
 
 LAST_FRAMES = {"grid2": 600, "slab": 700, "retract": 1000}

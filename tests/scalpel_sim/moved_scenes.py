@@ -1,9 +1,9 @@
 """Scenes whose hands start elsewhere."""
 
-from dataclasses import replace
-
 import msgspec
 import numpy as np
+
+from scalpel_sim.scene.scene import changed
 
 FARTHEST = 3e-3
 """How far starts are moved [m]."""
@@ -23,7 +23,7 @@ def moved(scene, rng):
         else stroke
         for stroke in scene.strokes
     ]
-    return replace(scene, graspers=tuple(graspers), strokes=tuple(strokes))
+    return changed(scene, graspers=tuple(graspers), strokes=tuple(strokes))
 
 
 def _moved_grasper(grasper, by):

@@ -7,9 +7,9 @@ import numpy as np
 
 from bridge import TcpLink
 from bridge.tcp.server import TissueServer
+from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.tables.view import sent_views
+from scalpel_sim.scene.served import sent_views
 
 N_TIMES = 6
 """Columns of wall times, the last of `COLUMNS`."""

@@ -1,7 +1,6 @@
 """Scenes with `[[attachment]]`: tissue that is held, pulled and tied, as files."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +8,11 @@ import pytest
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
+from scalpel_sim.preparation.tissue import make_tissue, times_of
 from scalpel_sim.recording.recording import COLUMNS, held_columns, read_forces
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.tables.attachment import AttachmentTable, check_attachment, times_of
+from scalpel_sim.scene.checks import check_attachment
+from scalpel_sim.scene.scene import changed
+from scalpel_sim.scene.schema import AttachmentTable
 from tests.scalpel_sim.served_scenes import served, untimed
 
 FILE = """\
@@ -111,7 +112,7 @@ def test_over_tcp_the_paths_and_the_forces_are_the_same_bits(first):
 def test_a_body_that_only_attachments_hold_hangs_from_them(first):
     scene = read_scene(first / "scene.toml")
     hook = AttachmentTable(where="top", stiffness=500.0, damping=2.0)
-    tissue = make_tissue(replace(scene, fixed="none", stretch=0.0, attachments=(hook,)))
+    tissue = make_tissue(changed(scene, fixed="none", stretch=0.0, attachments=(hook,)))
     for _ in range(50):
         tissue.step(None, 1e-3)
     (attachment,) = tissue.attachments

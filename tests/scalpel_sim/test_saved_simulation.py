@@ -10,7 +10,7 @@ import pytest
 from bridge import TcpLink
 from bridge.tcp.server import TissueServer
 from scalpel_sim import SCENES, prepare
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings, values_in
 from scalpel_sim.viewer.scene_packets import ScenePackets

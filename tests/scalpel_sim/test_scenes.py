@@ -4,15 +4,14 @@ import sys
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.scene_parts.scene import changed
-from scalpel_sim.tables.material import material_called
+from scalpel_sim.scene.scene import changed, material_called
 
 GRID2 = SCENES["grid2"]
 
 
 def test_the_floor_of_the_scene_is_a_height_and_that_of_snapping_a_share():
     scene = changed(GRID2, floor=-0.05, snap=0.1)
-    assert scene.floor == -0.05
+    assert scene.world.floor == -0.05
     assert (scene.cut.snap, scene.cut.floor) == (0.1, 0.1)
 
 
@@ -31,11 +30,12 @@ def test_another_law_drops_the_parameters_of_the_law_before():
     assert (yeoh.stiffening, yeoh.yeoh_second) == (0.0, 2.0)
 
 
-def test_what_is_not_given_stays():
-    assert changed(GRID2, material=None, law=None, floor=None) == GRID2
+def test_what_is_not_given_stays_and_none_is_a_value():
+    assert changed(GRID2) == GRID2
+    assert changed(changed(GRID2, floor=-0.05), floor=None) == GRID2
 
 
-@pytest.mark.parametrize("module", ["scalpel_sim.scenes", "scalpel_sim.cli.app"])
+@pytest.mark.parametrize("module", ["scalpel_sim.scene.read", "scalpel_sim.cli.app"])
 def test_a_list_of_scenes_and_the_help_load_no_compiler_and_no_plots(module):
     program = (
         f"import sys, {module}; "

@@ -1,7 +1,6 @@
 """What a client knows of a scene whose tissue is in another process: of a file, or by its name."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +9,12 @@ from bridge import InProcessLink, LinkError, SceneView
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
+from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.recording import read_forces
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import SCENES, scene_of
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.scene import changed
+from scalpel_sim.scene.schema import ViewTable
+from scalpel_sim.scene.served import scene_of
 from scalpel_sim.viewer import replay
 from tests.scalpel_sim.served_scenes import address_of_server, served, untimed
 
@@ -63,7 +64,7 @@ def path(tmp_path_factory):
 
 def test_a_scene_in_a_file_runs_with_its_tissue_elsewhere_as_it_does_here(path):
     here, there = path.parent / "here", path.parent / "there"
-    scene = replace(read_scene(path), audit=True)  # as `run` has it
+    scene = changed(read_scene(path), audit=True)  # as `run` has it
     words = ["run", str(path), "-q", "--out"]
     assert command_line([*words, str(here)]) == 0
     assert command_line([*words, str(there), "--connect", address_of_server(scene)]) == 0
@@ -90,7 +91,7 @@ def test_the_file_is_read_before_the_server_is_asked(path, capsys):
 
 def test_a_client_that_knows_the_scene_by_name_has_its_graspers_and_the_views_of_the_server():
     above = ViewTable(name="above", eye=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0), up=(0, 1, 0))
-    scene = replace(SCENES["retract"], views=(above,))
+    scene = changed(SCENES["retract"], views=(above,))
     with served(scene) as link:
         found = scene_of(link)
     assert found.graspers == scene.graspers and found.strokes == scene.strokes
@@ -143,7 +144,7 @@ def test_a_scene_is_not_put_around_the_body_of_another():
 
 
 def test_a_name_with_a_dot_is_that_of_its_scene_over_a_link():
-    scene = replace(SCENES["grid2"], name="grid.2")
+    scene = changed(SCENES["grid2"], name="grid.2")
     with served(scene) as link:
         assert link.describe().scene == "grid_2"
         assert scene_of(link, scene).name == "grid.2"

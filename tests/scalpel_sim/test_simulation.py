@@ -11,13 +11,14 @@ from scalpel_sim.cli.options import BodyOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.preparation.tissue import check_scene, make_tissue, pulled_apart
 from scalpel_sim.recording.recording import COLUMNS, read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES, SCENE
 from scalpel_sim.runs.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
-from scalpel_sim.scene_parts.scene import GEL, changed
-from scalpel_sim.scenes import DEFAULT_SCENE, scene_called, scene_of
+from scalpel_sim.scene.read import DEFAULT_SCENE, scene_called
+from scalpel_sim.scene.scene import GEL, changed
+from scalpel_sim.scene.served import scene_of
 from tests.run_files import names_in
 from tissue import Tissue, block, write_vtu
 
@@ -142,9 +143,9 @@ def test_a_stretch_moves_held_sides_apart_and_nothing_else():
 
 
 def test_other_sides_held_drop_the_stretch_that_came_with_the_scene():
-    assert changed(GRID2, fixed="bottom").stretch == 0.0
-    assert changed(GRID2, fixed="bottom", stretch=0.1).stretch == 0.1
-    assert changed(GRID2, toughness=3.0).stretch == GRID2.stretch
+    assert changed(GRID2, fixed="bottom").body.stretched_by == 0.0
+    assert changed(GRID2, fixed="bottom", stretch=0.1).body.stretched_by == 0.1
+    assert changed(GRID2, toughness=3.0).body.stretched_by == GRID2.body.stretched_by
 
 
 def test_a_body_is_at_rest_when_the_run_begins():
@@ -237,7 +238,9 @@ def test_a_body_that_folds_as_it_settles_gets_a_warning_that_names_what_helps(ca
         caplog.text,
     )
     assert "less --gravity" in caplog.text
-    assert ("less --stretch" in caplog.text) == (GRID2.stretch != 0.0)  # only what there is
+    assert ("less --stretch" in caplog.text) == (
+        GRID2.body.stretched_by != 0.0
+    )  # only what there is
 
 
 def test_springs_that_the_blade_would_fold_are_refused_before_the_body_settles(monkeypatch):

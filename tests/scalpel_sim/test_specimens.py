@@ -6,7 +6,7 @@ import pytest
 
 from bridge import InProcessLink
 from scalpel_sim import SCENES, prepare
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.preparation.tissue import make_tissue
 from tissue import MATERIALS, BladeSweep, pieces_of
 
 NEAR = 0.05

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, SimulationState, prepare
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.test_saved_simulation import go_on, picture
 from tissue import StateError, TissueState
 
@@ -88,7 +88,7 @@ def test_loading_bytes_changes_no_constant():
     [
         ({"tissue_every": 2}, "tissue_every"),
         ({"stroke": "curved"}, "the stroke"),
-        ({"arm": "premium"}, "the arm"),
+        ({"preset": "premium"}, "the arm"),
     ],
 )
 def test_bytes_of_a_simulation_with_other_settings_are_refused(changes, differs):

@@ -7,14 +7,14 @@ import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare
 from scalpel_sim.arm.standing import TABLETOP
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 
 SLAB = changed(SCENES["slab"], table=-1e-4)
 
 
 def through(depth):
     """A scene in which the tip is let down beside the body, that deep below the table [m]."""
-    low = SLAB.table - depth
+    low = SLAB.world.table - depth
     points = [[0.02, -0.01, 0.005], [0.02, -0.01, low], [0.02, 0.05, low]]
     stroke = StrokeTable(kind="points", points=points, length=0.045, forward=[0.0, 1.0, 0.0])
     return changed(SLAB, strokes=(stroke,))
@@ -25,7 +25,7 @@ def test_the_table_stands_in_the_model_where_the_tissue_has_it():
     board = simulation.arm.data.geom(TABLETOP)
     half = simulation.arm.model.geom(TABLETOP).size
     top = board.xpos + np.array([0.0, 0.0, half[2]])
-    assert simulation.frame.points_to_tissue(top)[2] == pytest.approx(SLAB.table, abs=1e-12)
+    assert simulation.frame.points_to_tissue(top)[2] == pytest.approx(SLAB.world.table, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["retract", "excise", "taut_incision"])
@@ -52,12 +52,12 @@ def test_a_planned_stroke_ends_on_the_table_without_a_warning(kind, caplog):
         simulation = prepare(changed(SCENES["organ"], strokes=(StrokeTable(kind=kind),)))
     poses = map(simulation.stroke.pose, simulation.stroke.times.tolist())
     lowest = min(min(pose.tip[2], pose.heel[2]) for pose in poses)
-    assert lowest == pytest.approx(SCENES["organ"].table, abs=1e-12) and caplog.text == ""
+    assert lowest == pytest.approx(SCENES["organ"].world.table, abs=1e-12) and caplog.text == ""
 
 
 def test_the_table_stops_the_blade():
     simulation = prepare(through(0.003))
     simulation.run(simulation.duration)
     tip = simulation.recording.vector("tip")[:, 2].min()
-    height = simulation.frame.points_to_world(np.array([0.0, 0.0, SLAB.table]))[2]
+    height = simulation.frame.points_to_world(np.array([0.0, 0.0, SLAB.world.table]))[2]
     assert tip > height - 1e-3

@@ -1,7 +1,5 @@
 """Scenes of two hands: what must be true at their end, and that both arms reach and stay apart."""
 
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
@@ -9,10 +7,9 @@ import pytest
 from bridge import InProcessLink
 from scalpel_sim import prepare
 from scalpel_sim.arm.place_search import LINK_RADIUS
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_file.build import scene_in
-from scalpel_sim.scene_file.layers import with_settings
-from scalpel_sim.scene_file.reading import shipped_scene
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
@@ -93,7 +90,7 @@ def pinched():
         for row in left.motion
     ]
     jaws = msgspec.structs.replace(left, holds="friction", closed=None, force=0.5, motion=closing)
-    return done(replace(EXCISE, graspers=(jaws,)))
+    return done(changed(EXCISE, graspers=(jaws,)))
 
 
 @pytest.fixture(scope="module")

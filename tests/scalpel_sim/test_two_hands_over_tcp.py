@@ -1,17 +1,14 @@
 """Scenes of two hands whose tissue is in another process: what they do, to the bit."""
 
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
 
 from bridge import LinkError
 from scalpel_sim import prepare
-from scalpel_sim.scene_file.build import scene_in
-from scalpel_sim.scene_file.layers import with_settings
-from scalpel_sim.scene_file.reading import shipped_scene
-from scalpel_sim.tables.grasper import WaypointTable
+from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
+from scalpel_sim.scene.scene import changed
+from scalpel_sim.scene.schema import WaypointTable
 from tests.bridge.bits import bits
 from tests.scalpel_sim.served_scenes import served, untimed
 
@@ -34,7 +31,7 @@ def closing_and_opening(**how):
         for time, at, opening in [*rows, (0.65, up, 0.016), (0.85, far, 0.016)]
     ]
     grasper = msgspec.structs.replace(left, motion=motion, **how)
-    return replace(COARSE, graspers=(grasper,))
+    return changed(COARSE, graspers=(grasper,))
 
 
 def ran(scene, link=None):

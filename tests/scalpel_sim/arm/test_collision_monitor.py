@@ -5,7 +5,7 @@ from bridge import FixtureBox
 from scalpel_sim import SCENES, StrokeTable, prepare
 from scalpel_sim.arm.arm import ARMS, Arm
 from scalpel_sim.arm.collision_monitor import FLOOR_MARGIN, CollisionMonitor, floor_below
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 
 
 def lowered(arm, height):

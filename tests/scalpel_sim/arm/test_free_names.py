@@ -1,17 +1,16 @@
 """Names that the program adds to a model of the user's are free, whatever the user's are."""
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 import pytest
-from msgspec.structs import replace as changed
+from msgspec import structs
 
 from bridge import FixtureMesh
 from scalpel_sim import GrasperTable, WaypointTable, prepare, read_scene
 from scalpel_sim.arm.free_names import free_name, free_prefix, names_in
 from scalpel_sim.arm.grasper import PADS_HEEL, PADS_TIP, GuidedGrasper, add_grasper
 from scalpel_sim.arm.hand import Impedance, add_hand
+from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
 from tests.scalpel_sim.served_scenes import served, untimed
 
@@ -72,14 +71,14 @@ def two_robots(folder, names):
     """A scene in which one robot cuts and one holds a grasper; both have these names."""
     folder.mkdir()
     scene = read_scene(EXAMPLES / "robot.toml")
-    own = replace(scene.own_arm, model=robot(folder / "robot.xml", names))
+    own = robot(folder / "robot.xml", names)
     (stroke,) = scene.strokes
-    stroke = changed(stroke, points=[[0.03, -2e-4, 0.01], [0.03, 0.05, 0.01]])
+    stroke = structs.replace(stroke, points=[[0.03, -2e-4, 0.01], [0.03, 0.05, 0.01]])
     aside, bare = (-0.02, 0.02, 0.1), robot(folder / "bare.xml", names, bare=True)
     rest = [WaypointTable(time=0.0, at=aside, opening=0.01), WaypointTable(time=0.1)]
     held = GrasperTable(model=bare, at="wrist_3", pos=(-0.5, 0.3, -0.2), motion=rest)
     around = {"graspers": (held,), "table": 0.0, "floor": -0.05}
-    return replace(scene, own_arm=own, strokes=(stroke,), **around)
+    return changed(scene, model=own, strokes=(stroke,), **around)
 
 
 def ran(scene, link=None):
@@ -210,7 +209,7 @@ def test_names_of_replicated_and_attached_elements_are_taken_too(tmp_path):
 
 def test_a_body_without_a_name_may_carry_the_blade_beside_a_grasper(tmp_path):
     scene = two_robots(tmp_path / "robots", {})
-    spec = mujoco.MjSpec.from_file(scene.own_arm.model)
+    spec = mujoco.MjSpec.from_file(scene.arm.model)
     spec.body("scalpel").name = ""
     (tmp_path / "robots" / "robot.xml").write_text(spec.to_xml(), encoding="utf-8")
     simulation = ran(scene)
@@ -230,6 +229,6 @@ def test_a_plane_may_be_called_as_a_fixture_and_both_are_told_apart(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(spec.to_xml(), encoding="utf-8")
     scene = read_scene(EXAMPLES / "robot.toml")
-    scene = replace(scene, own_arm=replace(scene.own_arm, model=str(path)), floor=-0.01)
+    scene = changed(scene, model=str(path), floor=-0.01)
     simulation = prepare(scene)
     assert simulation.arm.fixtures == {"floor": "fixture_floor"}

@@ -3,9 +3,9 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
+from scalpel_sim.scene.strokes import PLANNED_STROKES, StrokeTable
 from scalpel_sim.strokes.drawn import drawn_stroke
 from scalpel_sim.strokes.planning import plan_stroke
-from scalpel_sim.tables.stroke import PLANNED_STROKES, StrokeTable
 from tissue import block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))

@@ -15,7 +15,7 @@ from scalpel_sim.bench.scaling import measure_scaling
 from scalpel_sim.bench.scenes import measure_scenes
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.summary import TABLE_1
-from scalpel_sim.scene_parts.choices import SCHEMES
+from scalpel_sim.scene.checks import SCHEMES
 
 
 def is_sane(measured):

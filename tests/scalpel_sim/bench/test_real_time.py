@@ -7,8 +7,8 @@ from scalpel_sim.bench.random_strokes import random_stroke
 from scalpel_sim.bench.results import load_results
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.read import SCENES
 
 CASES = (
     "plain",

@@ -114,7 +114,7 @@ WRONG_USE = {
     "bevels that do not fit": (["run", "slab", "--blade-thickness", "0.01"], "only 0.006 m high"),
     "an edge radius that is no number": (
         ["run", "slab", "--blade-edge-radius", "nan"],
-        "edge_radius",
+        "edge-radius is nan; it must be",
     ),
     "a bevel of a line": (
         ["run", "organ", "--blade-thickness", "0", "--blade-bevel", "10"],

@@ -5,8 +5,8 @@ import pytest
 from scalpel_sim.cli.options import ArmOptions, SolverOptions, TissueOptions
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.cli.scene_options import chosen_scene
+from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.runs.options import ClientOptions, OutputOptions, PrintOptions
-from scalpel_sim.scene_body import make_tissue
 from tissue import SolverSettings
 
 

@@ -7,7 +7,7 @@ from scalpel_sim.figures.camera import Margins, fit_view, view_from
 from scalpel_sim.figures.light import SurfacePoints, illuminate, make_lights
 from scalpel_sim.figures.rendering import SceneObject, render
 from scalpel_sim.figures.table import table_below
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.primitives import TriangleMesh
 
 UP = np.array([0.0, 0.0, 1.0])

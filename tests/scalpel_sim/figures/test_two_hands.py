@@ -1,7 +1,6 @@
 """The picture of a scene of two hands: one command makes it."""
 
 import json
-from dataclasses import replace
 
 import matplotlib.image
 import numpy as np
@@ -9,12 +8,13 @@ import numpy as np
 from scalpel_sim import SCENES
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.figures import figures
+from scalpel_sim.scene.scene import changed
 
 
 def test_the_picture_shows_what_the_left_hand_lifts_before_and_after_it_is_cut_off(
     monkeypatch, tmp_path, capsys
 ):
-    fast = replace(SCENES["retract"], relaxation="verlet")
+    fast = changed(SCENES["retract"], relaxation="verlet")
     monkeypatch.setitem(SCENES, "retract", fast)
     monkeypatch.setattr(figures, "_WIDTH", 240)
     monkeypatch.setattr(figures, "HEIGHT", 195)

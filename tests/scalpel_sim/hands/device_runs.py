@@ -13,7 +13,7 @@ from scalpel_sim import prepare
 from scalpel_sim.runs.device_run import DeviceRun, device_run
 from scalpel_sim.runs.options import DeviceOptions
 from scalpel_sim.runs.prepared_run import PreparedRun
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.hands.driven_runs import GRID2
 
 PERIOD = 1e-3

@@ -8,7 +8,7 @@ from scalpel_sim.hands.commands import End, Engage, Pause, Release, Reset, Resum
 from scalpel_sim.hands.run_controls import FRAMES_PER_STEP
 from scalpel_sim.recording.recording import COLUMNS, read_forces
 from scalpel_sim.runs.file_names import FINAL, FORCES, REPLAY, STROKE, SUMMARY
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.hands.driven_runs import GRID2, controls_of, done, led, move
 
 UNTIMED = COLUMNS.index("cd_s")

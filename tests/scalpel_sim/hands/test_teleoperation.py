@@ -1,4 +1,3 @@
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.runs.file_names import FINAL, STROKE
 from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
 from tests.scalpel_sim.hands.driven_runs import (
     DT,
@@ -189,7 +188,7 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
         outputs.close()
 
     recorded = StrokeTable(kind="recorded", file=str(tmp_path / STROKE))
-    repeated = prepare(replace(scene, strokes=(recorded,)))
+    repeated = prepare(changed(scene, strokes=(recorded,)))
     repeated.run(0.05)
     same_rows = [each.recording.rows[:, :UNTIMED] for each in (simulation, repeated)]
     assert np.ptp(simulation.recording.vector("tip")[:, 1]) > 1e-3

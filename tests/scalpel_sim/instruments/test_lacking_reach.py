@@ -1,17 +1,17 @@
 """Arms of any hinges and slides reach what their joints allow; else a message says what lacks."""
 
 import re
-from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
-from msgspec.structs import replace as changed
+from msgspec import structs
 
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim import GrasperTable, WaypointTable, prepare, read_scene
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.instruments.own_arm import move_to_start, own_arm
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.stroke import Stroke
 from tests.scalpel_sim.instruments.test_own_arm import (
     EXAMPLES,
@@ -107,9 +107,9 @@ def test_a_scene_out_of_reach_runs_after_its_pos_was_corrected_by_no_more_than_i
         prepare(scene)
     pos = corrected(str(refused.value))
     nearer = pos + 0.05 * (origin - pos) / np.linalg.norm(origin - pos)
-    prepare(replace(scene, own_arm=replace(scene.own_arm, pos=tuple(pos))))
+    prepare(changed(scene, pos=tuple(pos)))
     with pytest.raises(PlacementError):
-        prepare(replace(scene, own_arm=replace(scene.own_arm, pos=tuple(nearer))))
+        prepare(changed(scene, pos=tuple(nearer)))
     with pytest.raises(PlacementError) as refused:
         prepare(scene, is_led=True)
     assert np.isfinite(corrected(str(refused.value))).all()
@@ -120,11 +120,11 @@ def test_a_robot_with_a_grasper_is_told_its_own_pos(tmp_path):
     rest = [WaypointTable(time=0.0, at=(0.03, 0.02, 0.15), opening=0.01), WaypointTable(time=0.1)]
     turned = (0.6, 0.0, 0.0, 0.8)
     held = GrasperTable(model=str(bare), at="wrist_3", pos=(-3, 0, 0), quat=turned, motion=rest)
-    scene = replace(read_scene(EXAMPLES / "robot.toml"), graspers=(held,))
+    scene = changed(read_scene(EXAMPLES / "robot.toml"), graspers=(held,))
     with pytest.raises(PlacementError, match="of the tissue's frame") as refused:
         prepare(scene)
     pos = tuple(corrected(str(refused.value), r"\[grasper\]"))
-    prepare(replace(scene, graspers=(changed(held, pos=pos),)))
+    prepare(changed(scene, graspers=(structs.replace(held, pos=pos),)))
 
 
 GANTRY = CHAINS["gantry"]
@@ -181,7 +181,6 @@ def test_an_arm_that_cannot_turn_every_way_cuts_the_block_in_two(name, bent, tmp
     scene = read_scene(EXAMPLES / "robot.toml")
     (stroke,) = scene.strokes
     pos = tuple(arm.blade.segment().tip - np.array(stroke.points[0]))
-    own = replace(scene.own_arm, model=str(tmp_path / "chain.xml"), pos=pos)
-    simulation = prepare(replace(scene, own_arm=own))
+    simulation = prepare(changed(scene, model=str(tmp_path / "chain.xml"), pos=pos))
     simulation.run(simulation.stroke.duration)
     assert simulation.link.n_pieces() == 2

@@ -1,7 +1,6 @@
 """An arm of the user's own in a scene: a robot with the kinematics of a UR5e, from MJCF alone."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -12,8 +11,8 @@ from bridge import DeviceLimits, TissueFrame
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.own_arm import move_to_start, own_arm
-from scalpel_sim.scene_file.writing import scene_text
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
+from scalpel_sim.scene.write import scene_text
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, pieces_of
@@ -171,6 +170,5 @@ def test_a_scene_with_an_arm_of_its_own_reads_back_the_same(tmp_path):
     path = tmp_path / "again.toml"
     path.write_text(scene_text(scene, path), encoding="utf-8")
     found = read_scene(path)
-    assert Path(found.own_arm.model).resolve() == ROBOT.resolve()
-    own = replace(found.own_arm, model=scene.own_arm.model)
-    assert replace(found, own_arm=own, mesh=scene.mesh) == scene
+    assert Path(found.arm.model).resolve() == ROBOT.resolve()
+    assert changed(found, model=scene.arm.model).settings() == scene.settings()

@@ -13,7 +13,7 @@ from scalpel_sim.recording.recording import WALL_TIMES, read_forces
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.scenes import read_scene
+from scalpel_sim.scene.read import read_scene
 from tests.scalpel_sim.hands.driven_runs import controls_of, through_the_body
 
 EVERY = 0.1

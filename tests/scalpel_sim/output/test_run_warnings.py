@@ -14,7 +14,8 @@ from scalpel_sim.output.run_outcome import outcome_of
 from scalpel_sim.output.run_warnings import warnings_of
 from scalpel_sim.recording.recording import COLUMNS, Recording, columns_of_hand
 from scalpel_sim.runs.run import run_time
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.body import GivenBody
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.stroke import Stroke
 from tests.scalpel_sim.served_scenes import served
 from tissue import Material, block
@@ -22,13 +23,13 @@ from tissue import Material, block
 GEL = Material(
     law="neo_hookean", young_modulus=30e3, poisson_ratio=0.45, toughness=20.0, friction=0.3
 )
-BLOCK = Scene(
-    "block",
-    "a block of 30 x 30 x 20 mm",
-    lambda: block((3, 3, 2), (0.03, 0.03, 0.02)),
+BLOCK = changed(
+    Scene(
+        name="block",
+        about="a block of 30 x 30 x 20 mm",
+        body=GivenBody(source=lambda: block((3, 3, 2), (0.03, 0.03, 0.02)), fixed="bottom"),
+    ),
     material=GEL,
-    fixed="bottom",
-    stretch=0.0,
     audit=True,
 )
 FREE = changed(BLOCK, fixed="none", table=0.0)
@@ -197,7 +198,7 @@ def test_a_blade_that_comes_when_the_body_has_fallen_never_touched_it():
 
 def test_tissue_that_is_too_tough_for_its_stiffness_releases_energy():
     tough = GEL.changed(young_modulus=5e3, toughness=160.0)
-    scene = replace(
+    scene = changed(
         BLOCK, mesh=lambda: block((4, 6, 4), (0.04, 0.06, 0.04)), material=tough, gravity=0.0
     )
     points = [[0.021, -0.008, -0.01], [0.021, 0.1, -0.01]]

@@ -4,7 +4,7 @@ import pytest
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
 from scalpel_sim.recording.force_parts import EDGE_COSINE, force_parts
 from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from tissue import RigidContacts
 
 FORWARD = np.array([0.0, 1.0, 0.0])

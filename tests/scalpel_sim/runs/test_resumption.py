@@ -15,7 +15,7 @@ from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES, PASSING_FILES, REPLAY_FRAMES
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.output.killed_runs import (
     Killed,
     at,
@@ -175,7 +175,7 @@ def test_a_run_that_was_killed_before_it_had_a_scene_is_refused_with_the_reason(
 
 
 def test_a_run_whose_tissue_was_elsewhere_is_refused_with_the_reason(tmp_path):
-    scene = replace(SLAB, mesh=lambda: SLAB.mesh())  # no table says what the body is
+    scene = changed(SLAB, mesh=lambda: SLAB.mesh())  # no table says what the body is
     kill_in(tmp_path, scene, 30)
     with pytest.raises(UsageError, match=r"its run was in another process, or .*--connect"):
         resumption_of(tmp_path)

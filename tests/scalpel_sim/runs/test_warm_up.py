@@ -14,7 +14,8 @@ from msgspec import structs
 import scalpel_sim
 from scalpel_sim.runs import warm_up
 from scalpel_sim.runs.warm_up import USUAL_SETS, KernelSet, compile_ahead, kernels_are_compiled
-from scalpel_sim.scenes import SCENES
+from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.scene import changed
 from tests.processes import environment
 from tissue import block, cache_directory
 
@@ -44,7 +45,7 @@ print(counted.names)
 
 def test_a_material_whose_stress_relaxes_needs_more_kernels():
     scene = SCENES["organ"]
-    relaxing = replace(scene, material=replace(scene.material, prony=((0.3, 0.1),)))
+    relaxing = changed(scene, material=replace(scene.material, prony=((0.3, 0.1),)))
     assert KernelSet.of(relaxing) == KernelSet.of(scene)._replace(relaxes=True)
     assert KernelSet.of(relaxing).body(block((2, 2, 2))).material.prony
     assert not KernelSet.of(scene).body(block((2, 2, 2))).material.prony
@@ -52,10 +53,10 @@ def test_a_material_whose_stress_relaxes_needs_more_kernels():
 
 def test_graspers_need_the_kernels_of_what_they_touch_and_of_what_they_tie():
     """A tissue that is served would else compile them in the step in which the jaws close."""
-    scene = replace(SCENES["retract"], table=None)
+    scene = changed(SCENES["retract"], table=None)
     (left,) = scene.graspers
-    rubbing = replace(scene, graspers=(structs.replace(left, holds="friction", closed=None),))
-    alone = replace(scene, graspers=())
+    rubbing = changed(scene, graspers=(structs.replace(left, holds="friction", closed=None),))
+    alone = changed(scene, graspers=())
     found = [KernelSet.of(each) for each in (scene, rubbing, alone)]
     assert [(each.is_held, each.has_table) for each in found] == [
         (True, True),

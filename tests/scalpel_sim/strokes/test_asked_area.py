@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
+from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.asked_area import asked_area, first_areas
 from scalpel_sim.strokes.incision import DEPTH, INSERTED_AT, SLOPE, WITHDRAWN_AT, plan_incision
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.tables.stroke import StrokeTable
 from tissue import MATERIALS, Material, Snapshot, TetrahedralMesh, block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
+from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.asked_pieces import asked_pieces
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.tables.stroke import StrokeTable
 from tissue import Material, Snapshot, TetrahedralMesh, block
 
 SIZE = np.array([0.04, 0.06, 0.04])

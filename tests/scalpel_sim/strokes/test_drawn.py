@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.drawn import drawn_stroke
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.tables.stroke import StrokeTable
 from tissue import BladeSegment, block
 
 SPEED = 0.05

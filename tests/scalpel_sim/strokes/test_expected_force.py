@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, prepare
-from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.expected_force import expected_force, is_inside, length_inside
 from scalpel_sim.strokes.incision import DEPTH, SLOPE
 from scalpel_sim.strokes.planning import plan_stroke

@@ -6,10 +6,10 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from scalpel_sim.scene.strokes import PLANNED_STROKES
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.planning import check_meets, plan_stroke
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.tables.stroke import PLANNED_STROKES
 from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe, read_mesh
 
 THROUGH = ("straight", "slanted", "curved")

@@ -7,7 +7,7 @@ import pytest
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.recording.force_parts import ForceParts
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import page
 from scalpel_sim.viewer import replay as replay_module
 from scalpel_sim.viewer.model_shapes import body_poses

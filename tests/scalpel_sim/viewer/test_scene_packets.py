@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridge import TissueFrame
-from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.cut_block import cut_block

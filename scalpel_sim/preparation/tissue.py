@@ -1,0 +1,252 @@
+"""The tissue of a scene: held, stretched, and settled."""
+
+import logging
+import math
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from scalpel_sim.arm.standing import Tabletop
+from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.scene import Scene, naming_table
+from scalpel_sim.scene.schema import AttachmentTable
+from scalpel_sim.strokes.stroke import from_csv
+from tissue import (
+    Attachment,
+    FloatArray,
+    FramePath,
+    Geom,
+    SolverSettings,
+    Tissue,
+    expect_toughness_in_range,
+    fixed_nodes,
+    toughness_law_of,
+)
+
+_log = logging.getLogger("scalpel_sim")
+
+LONG_DRAG = 0.1
+"""How far a blade may drag the tissue without a warning, as a share of the body's median extent."""
+
+MOST_INVERTED = 0.0
+"""Share of tetrahedra that may be inside out after settling without a warning."""
+
+LEAST_VOLUME = 0.9
+"""Volume after settling over that at rest below which there is a warning. Soft tissue barely
+changes its volume; held at its sides the softest scene keeps 0.99."""
+
+_HARDLY_COMPRESSIBLE = 0.45
+"""Poisson's ratio that most presets have [1]."""
+
+TABLE_MARGIN = 0.08
+"""How far a table reaches beyond the body [m]: as far as pieces are put down next to it."""
+
+TABLE_HALF_THICKNESS = 0.005
+"""Half the thickness of a table [m]: what is pressed on it is never nearer to the other side."""
+
+OPPOSITE_SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
+"""Pairs of sides that can be pulled apart, one pair per axis."""
+
+
+def make_tissue(scene: Scene) -> Tissue:
+    """Return the tissue of a scene, at rest under gravity between the sides that are held.
+
+    Raises:
+        MeshError: the mesh cannot be cut.
+        ValueError: the material or the fixed nodes make no sense for this mesh, or the blade would
+            fold its springs.
+        TissueError: the body cannot come to rest.
+    """
+    mesh, solver = scene.mesh(), scene.solver
+    fixed = fixed_nodes(mesh, scene.body.fixed)
+    tissue = Tissue(
+        mesh,
+        scene.material,
+        fixed=fixed,
+        positions=pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by),
+        gravity=(0.0, 0.0, -scene.world.gravity),
+        floor=scene.world.floor,
+        blade=scene.blade,
+        solver=SolverSettings(
+            cut=scene.cut,
+            scheme=solver.scheme,
+            relaxation=solver.relaxation,
+            threads=solver.threads,
+            audit=solver.audit,
+            mass_scaling=solver.mass_scaling or None,
+            precision=solver.precision,
+        ),
+    )
+    expect_toughness_in_range(scene.material, tissue.node_size)  # a blade will come
+    table = tabletop_of(scene, tissue.bounds)
+    if table is not None:
+        tissue.collide_with([table.geom], [table.centre])
+    attachments = _attached(tissue, scene.attachments)
+    if fixed.any() or table is not None or attachments:
+        tissue.settle()
+        _warn_of_collapse(tissue, scene)
+    for attachment, row in zip(attachments, scene.attachments, strict=True):
+        ends = math.inf if row.release_at is None else row.release_at
+        attachment.follow(FramePath(times_of(row), row.displacements or (), release_at=ends))
+    return tissue
+
+
+def tabletop_of(scene: Scene, bounds: FloatArray) -> Tabletop | None:
+    """Return the table of a scene; None where it has none.
+
+    Args:
+        scene: The scene.
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+    """
+    world = scene.world
+    if world.table is None:
+        return None
+    friction = scene.material.friction if world.table_friction is None else world.table_friction
+    middle, half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])
+    # Whole millimetres: the same table, whatever a body has sagged by before it is made.
+    size = np.ceil(1e3 * (half[:2] + TABLE_MARGIN)) * 1e-3
+    centre = np.array([*np.round(middle[:2], 3), world.table - TABLE_HALF_THICKNESS])
+    geom = Geom("tabletop", "box", (*size.tolist(), TABLE_HALF_THICKNESS), float(friction))
+    return Tabletop(geom, centre)
+
+
+def times_of(table: AttachmentTable) -> list[float]:
+    """Return when the frame of an attachment is at each of its displacements [s]."""
+    if table.displacements is None:
+        return []
+    if table.speed is None:
+        assert table.times is not None
+        return table.times
+    found, seconds = [], 0.0
+    for here, there in pairwise([(0.0, 0.0, 0.0), *table.displacements]):
+        seconds += math.dist(here, there) / table.speed
+        found.append(seconds)
+    return found
+
+
+def _attached(tissue: Tissue, tables: Sequence[AttachmentTable]) -> list[Attachment]:
+    """Attach what holds the tissue, before it settles.
+
+    Raises:
+        UsageError: one cannot be attached; the message names its table.
+    """
+    return [
+        naming_table(f"[[attachment]] number {i + 1}", partial(_attach, tissue, table))
+        for i, table in enumerate(tables)
+    ]
+
+
+def _attach(tissue: Tissue, table: AttachmentTable) -> Attachment:
+    """Make one attachment, or ligament."""
+    breaks_at = math.inf if table.breaks_at is None else table.breaks_at
+    if table.to is None:
+        return tissue.attach(
+            table.where,
+            stiffness=table.stiffness,
+            damping=table.damping,
+            rest_length=table.rest_length or 0.0,
+            breaks_at=breaks_at,
+        )
+    assert table.area is not None and table.toughness is not None
+    return tissue.tie(
+        table.where,
+        table.to,
+        stiffness=table.stiffness,
+        damping=table.damping,
+        rest_length=table.rest_length,
+        breaks_at=breaks_at,
+        area=table.area,
+        toughness=table.toughness,
+    )
+
+
+def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:
+    """Warn where a body that has settled has folded over, or has lost volume."""
+    material = scene.material
+    inverted = tissue.cut_report().now.inverted
+    pieces = tissue.pieces()
+    volume = sum(piece.volume for piece in pieces) / sum(piece.rest_volume for piece in pieces)
+    if inverted <= MOST_INVERTED and volume >= LEAST_VOLUME:
+        return
+    remedies = ["--law neo_hookean"] if material.law == "springs" else []
+    if material.poisson_ratio < _HARDLY_COMPRESSIBLE:
+        remedies.append(f"--poisson-ratio {_HARDLY_COMPRESSIBLE}")
+    remedies.append("a larger --young")
+    remedies += ["less --stretch"] * (scene.body.stretched_by != 0.0)
+    remedies += ["less --gravity"] * (scene.world.gravity > 0.0)
+    _log.warning(
+        "settled, %.2g %% of the tetrahedra are inside out, and the body has %.3g %% of its "
+        "volume: forces on a blade there mean little. What may help: %s, or a mesh without flat "
+        "tetrahedra",
+        1e2 * inverted,
+        1e2 * volume,
+        ", ".join(remedies),
+    )
+
+
+def check_scene(scene: Scene) -> None:
+    """Check a scene as far as possible before its tissue is made.
+
+    Raises:
+        MeshError: the mesh cannot be cut.
+        StrokeError: the file of a stroke cannot be used.
+        ValueError: no nodes are where they are to be held.
+    """
+    for stroke in scene.strokes:
+        if stroke.file is not None:
+            from_csv(stroke.file)
+    mesh = scene.mesh()
+    fixed_nodes(mesh, scene.body.fixed)
+    pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by)
+    for i, attachment in enumerate(scene.attachments):
+        region = partial(fixed_nodes, mesh, attachment.where)
+        naming_table(f"[[attachment]] number {i + 1}", region)
+    drag = highest_toughness(scene) / scene.material.young_modulus
+    extent = float(np.median(np.ptp(mesh.positions, axis=0)))
+    if drag > LONG_DRAG * extent and not scene.material.stiffens:
+        _log.warning(
+            "the blade will drag the tissue along by some %.2g mm (toughness / Young's modulus) "
+            "before the tissue parts, and the body measures %.3g mm: the cut may stay unfinished. "
+            "A larger --young or a smaller --toughness cuts cleanly",
+            1e3 * drag,
+            1e3 * extent,
+        )
+
+
+def highest_toughness(scene: Scene) -> float:
+    """Return the highest toughness in a scene [J/m2]: of the skin, or at the stroke's speed."""
+    material = scene.material
+    resistance = toughness_law_of(material, scene.blade)
+    at_speed = resistance.toughness
+    if material.toughness_exponent > 0.0:
+        ratio = scene.speed / material.toughness_speed
+        at_speed *= 1.0 + ratio**material.toughness_exponent
+    return max(resistance.skin_toughness, at_speed)
+
+
+def pulled_apart(positions: FloatArray, fixed: str, stretch: float) -> FloatArray:
+    """Return the positions with opposite held sides moved apart by the fraction `stretch`.
+
+    The body between them is stretched evenly: a start from which it settles.
+
+    Args:
+        positions: Rest positions [m], shape (n_nodes, 3).
+        fixed: Which sides are held, as in `HeldBodyTable.fixed`.
+        stretch: Fraction of the distance between the sides.
+
+    Raises:
+        UsageError: there is a stretch, and no two opposite sides are held.
+    """
+    if stretch == 0.0:
+        return positions
+    held = {name.strip().lower() for name in fixed.split(",")}
+    pulled = np.array([held.issuperset(pair) for pair in OPPOSITE_SIDES])
+    if not pulled.any():
+        raise UsageError(
+            f"--stretch {stretch} pulls opposite sides apart, and '{fixed}' holds no such pair; "
+            "use --fix left,right or --stretch 0"
+        )
+    centre = (positions.min(axis=0) + positions.max(axis=0)) / 2.0
+    return np.asarray(centre + (positions - centre) * np.where(pulled, 1.0 + stretch, 1.0))

@@ -1,0 +1,334 @@
+"""What makes no sense together in a scene: each check stands here, once."""
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import msgspec
+import numpy as np
+
+from bridge import VirtualCoupling
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.schema import (
+    ArmTable,
+    AttachmentTable,
+    GrasperTable,
+    SolverTable,
+    ViewTable,
+    WaypointTable,
+    WorldTable,
+)
+from scalpel_sim.scene.strokes import STROKES, StrokeTable
+from scalpel_sim.scene.values import Kind
+from tissue import Material
+
+SCHEMES = ("stellar", "paper")
+"""Names of the schemes that `Tissue` takes."""
+
+RELAXATIONS = ("global", "verlet", "hierarchical")
+"""Names of the relaxations that `Tissue` takes."""
+
+_PRECISIONS = ("single", "double")
+"""Precisions that `Tissue` takes."""
+
+COUPLINGS = ("rigid", "virtual")
+"""Names of the couplings between the arm's blade and the one that cuts."""
+
+ARM_CHOICES = ("auto", "touch", "premium")
+"""Names of the arms, and `auto`: the first of them that reaches."""
+
+LONGEST_RUN = 3600.0
+"""Longest simulated time of a run [s]: more is taken for a typing error."""
+
+FASTEST_STROKE = 1.0
+"""Highest speed of a stroke [m/s]: no surgeon cuts as fast."""
+
+_SMALLEST_TILT = 1e-6
+"""Sine of the angle between the line of sight and `up` below which a picture has no upper side."""
+
+OF_OWN_ARM = ("heel", "tip", "forward", "force", "torque")
+"""Keys of `[arm]` that describe an arm of the user's own."""
+
+OF_PLACE = ("pos", "quat")
+"""Keys of `[world]` that place the tissue in the world of such an arm."""
+
+_OF_LIGAMENT = ("area", "toughness")
+"""Keys that a ligament has, which has a `to`, and no other attachment."""
+
+_OF_MODEL = ("at", "pos", "quat")
+_OF_HOLD = ("stiffness", "damping", "breaks_at", "closed")
+
+
+def can_audit(relaxation: str) -> bool:
+    """Return whether an energy account can be kept: where all nodes move together."""
+    return relaxation in ("global", "verlet")
+
+
+def check_choice(kind: str, name: str, choices: Sequence[str]) -> None:
+    """Check that a name is one of some choices.
+
+    Raises:
+        UsageError: it is none; the message lists them, the nearest first.
+    """
+    if name not in choices:
+        raise unknown(kind, name, choices)
+
+
+def check_solver(solver: SolverTable, material: Material) -> None:
+    """Check that the settings of the solver exist, and go with each other and the material.
+
+    Raises:
+        UsageError: they do not; the message says why.
+    """
+    relaxation, threads = solver.relaxation, solver.threads
+    check_choice("scheme", solver.scheme, SCHEMES)
+    check_choice("relaxation", relaxation, RELAXATIONS)
+    check_choice("precision", solver.precision, _PRECISIONS)
+    if threads != 1 and relaxation == "hierarchical":
+        raise UsageError(
+            f"--threads {threads} is for --relaxation global or verlet; {relaxation} runs on one"
+        )
+    cores = os.cpu_count() or 1
+    if not 1 <= threads <= cores:
+        raise UsageError(
+            f"--threads is {threads}; it must be from 1 to {cores}, the number of cores"
+        )
+    if solver.audit and not can_audit(relaxation):
+        raise UsageError(
+            f"--audit needs --relaxation global or verlet, not {relaxation}; omit "
+            "--audit, or choose one of those"
+        )
+    if relaxation == "verlet" and material.stiffens:
+        raise UsageError(f"--relaxation verlet gains energy under law {material.law}; use global")
+    if not (solver.mass_scaling >= 0.0 and math.isfinite(solver.mass_scaling)):
+        raise UsageError(
+            f"--mass-scaling is {solver.mass_scaling}; it is an angular frequency [1/s], or 0 "
+            "for no added mass"
+        )
+
+
+def check_arm(arm: ArmTable, world: WorldTable) -> None:
+    """Check which arm there is, and its coupling to the tissue.
+
+    Raises:
+        UsageError: there is no such arm or coupling, or a key is about another.
+    """
+    check_choice("arm", arm.preset, ARM_CHOICES)
+    virtual_coupling(arm)
+    if arm.model is not None:
+        if arm.preset != "auto":
+            raise UsageError("[arm] has a preset and a model; choose one")
+        return
+    for name, table, keys in (("arm", arm, OF_OWN_ARM), ("world", world, OF_PLACE)):
+        usual = type(table)()
+        for key in keys:
+            if getattr(table, key) != getattr(usual, key):
+                raise UsageError(
+                    f"[{name}] {key} is for an arm of your own; add [arm] model, or omit it"
+                )
+
+
+def virtual_coupling(arm: ArmTable) -> VirtualCoupling | None:
+    """Return the coupling of the arm's blade to the one that cuts; None where they are one.
+
+    Raises:
+        UsageError: there is no such coupling, or it cannot have such a stiffness or damping.
+    """
+    check_choice("coupling", arm.coupling, COUPLINGS)
+    numbers = {"stiffness": arm.coupling_stiffness, "damping": arm.coupling_damping}
+    given = {name: value for name, value in numbers.items() if value is not None}
+    if arm.coupling == "virtual":
+        try:
+            return VirtualCoupling(**given)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+    for name in given:
+        raise UsageError(f"--coupling-{name} is for --coupling virtual; a rigid one has none")
+    return None
+
+
+def check_range(stretch: float, gravity: float, seconds: float | None) -> None:
+    """Check numbers whose range is wider than any scene needs.
+
+    Raises:
+        UsageError: one is out of its range.
+    """
+    if not -0.5 <= stretch <= 1.0:
+        raise UsageError(f"stretch is {stretch}; it is a fraction from -0.5 to 1")
+    if not 0.0 <= gravity <= 100.0:
+        raise UsageError(f"gravity is {gravity} m/s2; it must lie between 0 and 100")
+    if seconds is not None and not 0.0 < seconds <= LONGEST_RUN:
+        raise UsageError(f"seconds is {seconds}; it must be above 0 and at most {LONGEST_RUN:g}")
+
+
+def check_keys(table: msgspec.Struct, where: str, kind_key: str, kinds: Mapping[str, Kind]) -> None:
+    """Check that the keys of a table are those of its kind. Keys of no kind belong to all.
+
+    Args:
+        table: The table; a key that is not given is None.
+        where: Its name as a file writes it.
+        kind_key: The key that says of which kind it is.
+        kinds: The keys of each kind.
+
+    Raises:
+        UsageError: one is missing, or belongs to another kind.
+    """
+    kind = getattr(table, kind_key)
+    own = kinds[kind]
+    for key in own.needed:
+        if getattr(table, key) is None:
+            raise UsageError(f'{where} of {kind_key} "{kind}" has no {key}')
+    for owner, keys in kinds.items():
+        for key in (*keys.needed, *keys.possible):
+            if key not in (*own.needed, *own.possible) and getattr(table, key) is not None:
+                keys_of_own = ", ".join((*own.needed, *own.possible)) or f"none besides {kind_key}"
+                raise UsageError(
+                    f'{where} of {kind_key} "{kind}" has the key {key}, which belongs to '
+                    f'{kind_key} "{owner}"; it has {keys_of_own}'
+                )
+
+
+def check_strokes(strokes: Sequence[StrokeTable]) -> None:
+    """Check that each stroke exists, and has what its kind needs.
+
+    Raises:
+        UsageError: there is none, no such kind, a key belongs to another, or numbers make no sense.
+    """
+    if not strokes:
+        raise UsageError("the scene has no stroke; give at least one [[stroke]]")
+    for i, stroke in enumerate(strokes):
+        _check_stroke(stroke, f"[[stroke]] number {i + 1}")
+
+
+def _check_stroke(stroke: StrokeTable, where: str) -> None:
+    check_choice("stroke", stroke.kind, tuple(STROKES))
+    check_keys(stroke, where, "kind", STROKES)
+    if stroke.speed is not None and stroke.speed > FASTEST_STROKE:
+        raise UsageError(
+            f"{where} speed is {stroke.speed} m/s; it must be above 0 and at most "
+            f"{FASTEST_STROKE:g}"
+        )
+    if (stroke.saw_amplitude is None) != (stroke.saw_frequency is None):
+        raise UsageError(f"{where} has one of saw_amplitude and saw_frequency; give both or none")
+    n_points = len(stroke.points or ())
+    if stroke.kind in ("points", "spline") and n_points < 2:
+        raise UsageError(f'{where} of kind "{stroke.kind}" has one point; it needs two or more')
+    if stroke.kind == "stab" and n_points != 1:
+        raise UsageError(
+            f'{where} of kind "stab" has {n_points} points; it has one, where the tip goes in'
+        )
+
+
+def check_attachment(table: AttachmentTable, where: str) -> None:
+    """Check that the keys of an attachment make sense together.
+
+    Args:
+        table: The table.
+        where: Its name as a file writes it.
+
+    Raises:
+        UsageError: they do not.
+    """
+    for key in _OF_LIGAMENT:
+        if (getattr(table, key) is None) != (table.to is None):
+            given, missing = (key, "to") if table.to is None else ("to", key)
+            raise UsageError(
+                f"{where} has {given} and no {missing}; a ligament, which the blade can cut, has "
+                "to, area and toughness"
+            )
+    if table.displacements is None:
+        for key in ("times", "speed"):
+            if getattr(table, key) is not None:
+                raise UsageError(f"{where} has {key} and no displacements; give them too")
+        return
+    if (table.times is None) == (table.speed is None):
+        raise UsageError(f"{where} has displacements; give either times or a speed with them")
+    if table.times is None:
+        if any(here == there for here, there in pairwise([(0.0, 0.0, 0.0), *table.displacements])):
+            raise UsageError(
+                f"{where} has two displacements in turn that are equal, which takes no time at a "
+                "speed; give times"
+            )
+        return
+    if len(table.times) != len(table.displacements):
+        raise UsageError(
+            f"{where} has {len(table.times)} times for {len(table.displacements)} displacements; "
+            "give one for each"
+        )
+    if not all(here < there for here, there in pairwise([0.0, *table.times])):
+        raise UsageError(f"{where} has times {table.times}; they begin above 0 and increase")
+
+
+def check_graspers(graspers: Sequence[GrasperTable]) -> None:
+    """Check that the keys of each grasper belong together, and that names differ.
+
+    Raises:
+        UsageError: they do not; the message says which.
+    """
+    for i, grasper in enumerate(graspers):
+        where = f"[[grasper]] number {i + 1}"
+        _check_grasper(grasper, where)
+        _check_own_name(grasper.name, [other.name for other in graspers[:i]], where)
+
+
+def _check_grasper(grasper: GrasperTable, where: str) -> None:
+    if grasper.recorded is not None and grasper.motion:
+        raise UsageError(f"{where} has a motion and a recorded one; choose one")
+    if grasper.recorded is None:
+        _check_motion(grasper.motion, where)
+    if grasper.model is not None:
+        if grasper.preset is not None:
+            raise UsageError(f"{where} has a preset and a model; choose one")
+        if grasper.at is None:
+            raise UsageError(f"{where} has a model and no at: the site or body that holds it")
+    for key in _OF_MODEL:
+        if grasper.model is None and getattr(grasper, key) is not None:
+            raise UsageError(f"{where} {key} is for an arm of your own; add a model, or omit it")
+    for key in _OF_HOLD:
+        if grasper.holds == "friction" and getattr(grasper, key) is not None:
+            raise UsageError(f'{where} {key} is for holds = "attachment"; friction has none')
+    if grasper.quat is not None and not any(grasper.quat):
+        raise UsageError(f"{where} quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
+
+
+def _check_motion(motion: Sequence[WaypointTable], where: str) -> None:
+    if not motion:
+        raise UsageError(f"{where} has no motion: rows such as {{time = 0.0, at = [0, 0, 0.1]}}")
+    for key in ("at", "opening"):
+        if getattr(motion[0], key) is None:
+            raise UsageError(f"the first row of motion of {where} has no {key}")
+
+
+def check_views(views: Sequence[ViewTable]) -> None:
+    """Check that each view shows something, the right way up, and that names differ.
+
+    Raises:
+        UsageError: they do not; the message says which.
+    """
+    for i, view in enumerate(views):
+        where = f"[[view]] number {i + 1}"
+        _check_view(view, where)
+        _check_own_name(view.name, [other.name for other in views[:i]], where)
+
+
+def _check_view(view: ViewTable, where: str) -> None:
+    distance = math.dist(view.eye, view.target)
+    if distance == 0.0:
+        raise UsageError(f"{where} has its eye at its target, {list(view.eye)}; move one of them")
+    length = math.hypot(*view.up)
+    if not (math.isfinite(distance) and math.isfinite(length)):
+        raise UsageError(f"{where} has an eye, a target or an up that is too large")
+    if length == 0.0:
+        raise UsageError(f"{where} up is [0, 0, 0]; it is a direction, such as [0, 0, 1]")
+    sight = (np.array(view.target) - np.array(view.eye)) / distance
+    if np.linalg.norm(np.cross(sight, np.array(view.up) / length)) < _SMALLEST_TILT:
+        across = [0, 1, 0] if abs(sight[1]) < abs(sight[2]) else [0, 0, 1]
+        raise UsageError(
+            f"{where} looks along its up, {list(view.up)}; give another up, such as {across}"
+        )
+
+
+def _check_own_name(name: str, taken: Sequence[str], where: str) -> None:
+    if name in taken:
+        raise UsageError(f"{where} has the name '{name}' of another; give each its own")

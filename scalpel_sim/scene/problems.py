@@ -1,0 +1,169 @@
+"""Finds what is wrong with the content of a TOML file, and where."""
+
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, get_args, get_origin
+
+import msgspec
+
+from scalpel_sim.errors import unknown
+
+REPLACED: dict[tuple[str, ...], str] = {
+    ("solver", "contact"): "contact is always by forces since version 0.2, and there is none with "
+    "relaxation hierarchical; omit it",
+}
+"""Keys of earlier versions, and what stands in their place."""
+
+_Table = type[msgspec.Struct]
+
+
+class Problem(NamedTuple):
+    """A key or a value that is wrong."""
+
+    text: str
+    """What is wrong, where, and what may stand there."""
+    key: tuple[str, ...]
+    """Parts of the key; rows are counted from 0."""
+
+
+def problem_of(content: Mapping[str, Any], table: _Table) -> Problem | None:
+    """Return the first problem of the content of a file, for people; None if there is none.
+
+    Args:
+        content: What the file has.
+        table: What it should be.
+    """
+    return _problem(content, table, "", (), table)
+
+
+def _problem(
+    content: Mapping[str, Any], table: _Table, where: str, at: tuple[str, ...], whole: _Table
+) -> Problem | None:
+    """Return the first problem of the content of a table.
+
+    Args:
+        content: What the file has.
+        table: What it should be.
+        where: Name of the table, as a file writes it: "[body]"; empty for the whole file.
+        at: Parts of its key.
+        whole: What the whole file should be.
+    """
+    kinds = kinds_of(table)
+    for key, value in content.items():
+        if key not in kinds:
+            return Problem(_unknown_key(key, value, kinds, where, at, whole), (*at, key))
+    for field in msgspec.structs.fields(table):
+        if field.required and field.encode_name not in content:
+            missing = _as_header(field.encode_name, field.type)
+            return Problem(f"{where or 'the file'} has no {missing}", at)
+    for key, value in content.items():
+        problem = _problem_of_value(key, value, kinds[key], where, (*at, key), whole)
+        if problem is not None:
+            return problem
+    return None
+
+
+def kinds_of(table: _Table) -> dict[str, Any]:
+    """Return the type of each key of a table."""
+    return {field.encode_name: field.type for field in msgspec.structs.fields(table)}
+
+
+def alternatives(kind: Any) -> Sequence[Any]:
+    """Return the types that a value may have, without None."""
+    if get_origin(kind) in (typing.Union, typing.get_origin(int | None)):
+        return [each for each in get_args(kind) if each is not type(None)]
+    return [kind]
+
+
+def table_of(kind: Any) -> _Table | None:
+    """Return the table that a value must be; None where it is none."""
+    only = alternatives(kind)[0]
+    return only if isinstance(only, type) and issubclass(only, msgspec.Struct) else None
+
+
+def row_table_of(kind: Any) -> _Table | None:
+    """Return the table that each row of a value must be; None where it is no array of tables."""
+    only = alternatives(kind)[0]
+    if get_origin(only) is typing.Annotated:
+        only = get_args(only)[0]
+    return table_of(get_args(only)[0]) if get_origin(only) in (list, tuple) else None
+
+
+def metas_of(kind: Any) -> list[msgspec.Meta]:
+    """Return the descriptions of a type."""
+    return [meta for each in alternatives(kind) for meta in getattr(each, "__metadata__", ())]
+
+
+def as_toml(value: object) -> str:
+    """Return a value as it stands in the file, cut short if it is long."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    try:
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+    except (ValueError, RecursionError):  # thousands of digits, or of tables in each other
+        return "too long to be shown"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _unknown_key(
+    key: str,
+    value: object,
+    kinds: Mapping[str, Any],
+    where: str,
+    at: tuple[str, ...],
+    whole: _Table,
+) -> str:
+    """Return what is wrong with a key that a table does not have."""
+    if (*at, key) in REPLACED:
+        return f"{where} {key}: {REPLACED[(*at, key)]}"
+    tables = {name: table_of(kind) for name, kind in kinds_of(whole).items()}
+    owners = [name for name, table in tables.items() if table and key in kinds_of(table)]
+    if owners and not isinstance(value, Mapping):
+        if not where:
+            return f"{key} stands in no table; write [{owners[0]}] on a line above it"
+        return f"{where} has the key {key}, which belongs to [{owners[0]}]"
+    if where:
+        return str(unknown(f"key of {where}", key, kinds))
+    return str(unknown("table" if isinstance(value, Mapping) else "key", key, kinds))
+
+
+def _problem_of_value(
+    key: str, value: object, kind: Any, where: str, at: tuple[str, ...], whole: _Table
+) -> Problem | None:
+    """Return what is wrong with a value of that type."""
+    row, inner = row_table_of(kind), table_of(kind)
+    if row is not None:
+        if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
+            what = f"tables: [[{key}]], then a key a line"
+            return Problem(f"{key} is {as_toml(value)}; it must be {what}", at)
+        if not value:
+            return Problem(f"the file has no [[{key}]]", at)
+        for i, each in enumerate(value):
+            name = f"{where} [[{key}]] number {i + 1}".strip()
+            problem = _problem(each, row, name, (*at, str(i)), whole)
+            if problem is not None:
+                return problem
+        return None
+    if inner is not None:
+        if not isinstance(value, Mapping):
+            what = f"a table: [{key}], then a key a line"
+            return Problem(f"{key} is {as_toml(value)}; it must be {what}", at)
+        return _problem(value, inner, f"[{key}]", at, whole)
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        text = f"{where} {key} is {as_toml(value)}; it must be {_allowed(kind)}"
+        return Problem(text.strip(), at)
+    return None
+
+
+def _as_header(name: str, kind: Any) -> str:
+    """Return how a file writes what is missing."""
+    if row_table_of(kind) is not None:
+        return f"[[{name}]]"
+    return f"[{name}]" if table_of(kind) is not None else f"{name}: {_allowed(kind)}"
+
+
+def _allowed(kind: Any) -> str:
+    """Return the description of a type."""
+    return next((meta.description for meta in metas_of(kind) if meta.description), "another value")

@@ -1,0 +1,281 @@
+"""A scene: a body, its material, how it is held, and the strokes through it."""
+
+from collections.abc import Callable
+from dataclasses import asdict, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import field, structs
+
+from bridge import VirtualCoupling
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.blade import blade_of, table_of_blade
+from scalpel_sim.scene.body import KEYS_OF_SHAPE, GivenBody, HeldBodyTable
+from scalpel_sim.scene.checks import (
+    check_arm,
+    check_attachment,
+    check_graspers,
+    check_keys,
+    check_range,
+    check_solver,
+    check_strokes,
+    check_views,
+    virtual_coupling,
+)
+from scalpel_sim.scene.schema import (
+    ArmTable,
+    AttachmentTable,
+    BladeTable,
+    GrasperTable,
+    PresetMaterialTable,
+    SolverTable,
+    ViewTable,
+    WorldTable,
+)
+from scalpel_sim.scene.strokes import DEFAULT_SPEED, StrokeTable, stroke_called
+from scalpel_sim.scene.values import NameOfScene, Positive, Text, TomlTable
+from tissue import MATERIALS, BladeShape, CutSettings, Material, TetrahedralMesh
+
+GEL = Material(blade_friction=MATERIALS["gelatin"].blade_friction.value)
+"""A soft gel that barely changes its volume, as tetrahedra: what a body is made of, unless another
+material is given. Its toughness / Young's modulus is 2 mm, the length by which the blade drags
+the tissue along before it parts. That must be small against the body, or the blade drags the body
+along instead of cutting it."""
+
+Made = TypeVar("Made")
+"""What `naming_table` returns."""
+
+
+class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
+    """A scene, as its file has it. Lengths in metres, tissue frame.
+
+    `material` and `blade` are what the engine takes; their tables may name a preset, or be partial.
+
+    Raises:
+        UsageError: a name or a number makes no sense, alone or with another.
+    """
+
+    name: NameOfScene = ""
+    """Name of the scene; that of its file without."""
+    about: Text = ""
+    """A description in one line."""
+    seconds: Positive | None = None
+    """How long to simulate [s; default: the strokes and 0.3 s more]."""
+    body: HeldBodyTable
+    """The geometry, and how it is held."""
+    material_table: PresetMaterialTable | None = field(default=None, name="material")
+    """The material; a soft gel without."""
+    blade_table: BladeTable = field(default_factory=BladeTable, name="blade")
+    """The blade; a scalpel without."""
+    world: WorldTable = field(default_factory=WorldTable)
+    """What is around the body."""
+    solver: SolverTable = field(default_factory=SolverTable)
+    """How the mesh is cut, and how the motion is computed."""
+    arm: ArmTable = field(default_factory=ArmTable)
+    """The arm, and how it is coupled to the tissue."""
+    attachments: tuple[AttachmentTable, ...] = field(default=(), name="attachment")
+    """What holds the tissue besides the fixed nodes."""
+    graspers: tuple[GrasperTable, ...] = field(default=(), name="grasper")
+    """Other arms, each with a grasper, and what they do."""
+    strokes: tuple[StrokeTable, ...] = field(default=(StrokeTable(),), name="stroke")
+    """What is done with the blade, in turn."""
+    views: tuple[ViewTable, ...] = field(default=(), name="view")
+    """Where pages and pictures show it from, the first of them at the start."""
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense."""
+        if not isinstance(self.body, GivenBody):
+            check_keys(self.body, "[body]", "shape", KEYS_OF_SHAPE)
+        check_strokes(self.strokes)
+        check_solver(self.solver, self.material)
+        _ = self.cut, self.blade  # they check themselves
+        check_range(self.body.stretched_by, self.world.gravity, self.seconds)
+        check_arm(self.arm, self.world)
+        for i, attachment in enumerate(self.attachments):
+            check_attachment(attachment, f"[[attachment]] number {i + 1}")
+        check_graspers(self.graspers)
+        check_views(self.views)
+
+    @cached_property
+    def material(self) -> Material:
+        """Material of the body."""
+        table = self.material_table
+        if table is None:
+            return GEL
+        return naming_table("[material]", lambda: material_of(table))
+
+    @cached_property
+    def blade(self) -> BladeShape | None:
+        """The blade as a body; None: a line, as in the paper."""
+        return naming_table("[blade]", lambda: blade_of(self.blade_table))
+
+    @cached_property
+    def cut(self) -> CutSettings:
+        """How closely cuts follow the blade, against how small the elements get."""
+        given = self.solver
+        floor = given.snap if given.snap_floor is None else given.snap_floor
+        settings = {"snap": given.snap, "floor": floor, "guard": given.guard, "crumb": given.crumb}
+        return naming_table("[solver]", lambda: CutSettings(**settings))
+
+    def mesh(self) -> TetrahedralMesh:
+        """Return the mesh of the body.
+
+        Raises:
+            MeshError: it cannot be cut.
+            ValueError: there can be no such body.
+        """
+        return self.body.mesh()
+
+    @property
+    def stroke(self) -> str:
+        """Kinds of the strokes, for a heading."""
+        return ", ".join(stroke.kind for stroke in self.strokes)
+
+    @property
+    def speed(self) -> float:
+        """Highest speed of the blade's tip in a stroke whose speed is given [m/s]."""
+        return max(stroke.speed or DEFAULT_SPEED for stroke in self.strokes)
+
+    def virtual_coupling(self) -> VirtualCoupling | None:
+        """Return the coupling of the arm's blade to the one that cuts; None where they are one."""
+        return virtual_coupling(self.arm)
+
+    @property
+    def recorded_files(self) -> list[Path]:
+        """Files of motions that a hand did, which the scene repeats."""
+        strokes = [each.file for each in self.strokes if each.kind == "recorded"]
+        motions = [each.recorded for each in self.graspers]
+        return [Path(file) for file in (*strokes, *motions) if file is not None]
+
+    def settings(self) -> dict[str, Any]:
+        """Return the numbers and names of the scene, for a report."""
+        world, solver, arm = self.world, self.solver, self.arm
+        own = {key: getattr(arm, key) for key in ("model", "heel", "tip", "forward", "force")}
+        own |= {"torque": arm.torque, "pos": world.pos, "quat": world.quat}
+        return {
+            "about": self.about,
+            "material": asdict(self.material),
+            "fixed": self.body.fixed,
+            "cut": asdict(self.cut),
+            "scheme": solver.scheme,
+            "relaxation": solver.relaxation,
+            "mass_scaling": solver.mass_scaling,
+            "precision": solver.precision,
+            "threads": solver.threads,
+            "stretch": self.body.stretched_by,
+            "gravity": world.gravity,
+            "floor": world.floor,
+            "table": world.table,
+            "table_friction": world.table_friction,
+            "blade": None if self.blade is None else asdict(self.blade),
+            "audit": solver.audit,
+            "attachments": [given_in(attachment) for attachment in self.attachments],
+            "strokes": [given_in(stroke) for stroke in self.strokes],
+            "arm": arm.preset,
+            "own_arm": None if arm.model is None else own,
+            "graspers": [given_in(grasper) for grasper in self.graspers],
+            "views": [given_in(view) for view in self.views],
+            "tissue_every": arm.tissue_every,
+            "coupling": arm.coupling,
+            "coupling_stiffness": arm.coupling_stiffness,
+            "coupling_damping": arm.coupling_damping,
+            "passivity": arm.passivity,
+            "seconds": self.seconds,
+            "stroke": self.stroke,
+        }
+
+
+def changed(scene: Scene, **changes: Any) -> Scene:
+    """Return a scene with some of it replaced.
+
+    Names are those of fields of the scene, of its `[body]`, `[world]`, `[solver]` and `[arm]`, and
+    of its material. Properties of a material change the `material` that is given besides, else the
+    scene's; another `law` drops the parameters of the law before.
+
+    The stretch of the scene is dropped where other sides are held; one that is given stays, and is
+    refused later where nothing can be pulled.
+
+    `mesh` makes the mesh of another body, which is held as before. `stroke` is the kind of a
+    stroke, or a CSV file, which replaces those of the scene; `speed` and `depth` are those of each.
+    """
+    given = dict(changes)
+    properties = {each.name for each in fields(Material)} & given.keys()
+    if properties or "material" in given:
+        material = given.pop("material", scene.material)
+        material = material.changed(**{name: given.pop(name) for name in properties})
+        given["material_table"] = PresetMaterialTable(**asdict(material))
+    if "mesh" in given:
+        fixed, stretch = scene.body.fixed, scene.body.stretch
+        given["body"] = GivenBody(source=given.pop("mesh"), fixed=fixed, stretch=stretch)
+    if "blade" in given:
+        given["blade_table"] = table_of_blade(given.pop("blade"))
+    if "stroke" in given:
+        given["strokes"] = (stroke_called(given.pop("stroke")),)
+    of_strokes = {name: given.pop(name) for name in ("speed", "depth") if name in given}
+    if of_strokes:
+        strokes = given.get("strokes", scene.strokes)
+        given["strokes"] = tuple(structs.replace(stroke, **of_strokes) for stroke in strokes)
+    if given.get("fixed", scene.body.fixed) != scene.body.fixed:
+        given.setdefault("stretch", 0.0)
+    for name in ("body", "world", "solver", "arm"):
+        table = given.get(name, getattr(scene, name))
+        own = {key: given.pop(key) for key in table.__struct_fields__ if key in given}
+        if own:
+            given[name] = structs.replace(table, **own)
+    return Scene(**structs.asdict(scene) | given)  # which checks itself
+
+
+def material_called(name: str) -> Material:
+    """Return the material of that name.
+
+    Raises:
+        UsageError: there is none; the message lists them.
+    """
+    if name not in MATERIALS:
+        raise unknown("material", name, MATERIALS)
+    return MATERIALS[name].material
+
+
+def material_of(table: PresetMaterialTable) -> Material:
+    """Return the material: figures that are given, those of a preset, and the usual ones.
+
+    Raises:
+        UsageError: there is no such preset, or neither a preset nor law and stiffness.
+        ValueError: the figures make no sense together.
+    """
+    given = given_in(table)
+    preset = given.pop("preset", None)
+    if preset is not None:
+        return material_called(preset).changed(**given)
+    if "law" not in given or "young_modulus" not in given:
+        raise UsageError("it needs a preset, or a law and a young_modulus")
+    return Material(**given)
+
+
+def given_in(table: msgspec.Struct) -> dict[str, Any]:
+    """Return the keys of a table that are given, and their values; rows of it as such too."""
+    return {
+        key: [given_in(row) for row in value]
+        if isinstance(value, list) and value and isinstance(value[0], msgspec.Struct)
+        else value
+        for key, value in structs.asdict(table).items()
+        if value is not None
+    }
+
+
+def naming_table(where: str, make: Callable[[], Made]) -> Made:
+    """Return what a function makes; an error of its input says where in the file that stands.
+
+    Args:
+        where: Name of a table, as a file writes it.
+        make: The function.
+
+    Raises:
+        UsageError: the input is wrong.
+    """
+    try:
+        return make()
+    except ValueError as error:
+        raise UsageError(f"{where}: {error}") from error

@@ -1,0 +1,307 @@
+"""The tables of a scene file: each key with what it may hold, its meaning, unit and default.
+
+The text below a key is its help on the command line, its comment in the files that `materials
+--write` makes, and its line in docs/scenes.md.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, field
+
+from scalpel_sim.scene.values import (
+    Angle,
+    Every,
+    FileName,
+    Finite,
+    FourNumbers,
+    Label,
+    LawName,
+    Name,
+    NotNegative,
+    Opening,
+    Positive,
+    Ratio,
+    Region,
+    RowsOfThree,
+    Series,
+    Share,
+    Text,
+    ThreeNumbers,
+    Times,
+    TomlTable,
+    TrueOrFalse,
+    Whole,
+    one_of,
+)
+from tissue import CutSettings, SolverSettings
+
+DEFAULT_FOV = 38.0
+"""Angle that a picture spans from its lower to its upper side, where a view gives none [deg]."""
+
+DEFAULT_MASS_SCALING = SolverSettings().mass_scaling or 0.0
+"""Angular frequency above which nodes get mass, where a scene gives none [1/s]."""
+
+DEFAULT_APPROACH, DEFAULT_ACROSS = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
+"""Direction of the shaft and of the jaws of a grasper at first, where a motion gives none."""
+
+STANDARD_GRAVITY = 9.81
+"""Gravity along -z [m/s2]."""
+
+_CUT = CutSettings()
+
+
+class MaterialTable(TomlTable, kw_only=True, frozen=True):
+    """`[material]`: the figures of `tissue.Material`."""
+
+    law: LawName | None = None
+    """How forces follow from deformation: springs along the edges of the mesh, as in the paper, or
+    tetrahedra: neo_hookean, or exponential or yeoh, which stiffen as they are stretched."""
+    young_modulus: Positive | None = None
+    """Young's modulus, the stiffness at small strain [Pa]."""
+    poisson_ratio: Ratio | None = None
+    """Poisson's ratio: below 0.5, and 0.25 or more for springs. Soft tissue has 0.45 to 0.49;
+    above 0.49 the time step becomes short."""
+    stiffening: NotNegative | None = None
+    """b of law exponential, 0 under the others: stretched to length 1 + e, tissue is exp(3 b e^2)
+    times as stiff. Soft organs have 5 to 30."""
+    yeoh_second: NotNegative | None = None
+    """C20 / C10 of law yeoh, 0 under the others."""
+    yeoh_third: NotNegative | None = None
+    """C30 / C10 of law yeoh, 0 under the others."""
+    prony: Series | None = None
+    """Relaxation of stress: g and tau [s] of one to three terms, [[g, tau], ...]; held tissue keeps
+    1 - sum of g (1 - exp(-t / tau)) of its stress. []: none relaxes, as under springs."""
+    density: Positive | None = None
+    """Density [kg/m3]."""
+    toughness: NotNegative | None = None
+    """Fracture toughness: the energy that a square metre of cut costs [J/m2]."""
+    skin_toughness: NotNegative | None = None
+    """Fracture toughness until the edge has broken in [J/m2]: the peak of a puncture. Less than
+    toughness means no peak."""
+    toughness_exponent: NotNegative | None = None
+    """Exponent n of a toughness that rises with the speed of the cut: toughness (1 + (speed /
+    toughness_speed)^n). 0: it does not rise."""
+    toughness_speed: Positive | None = None
+    """Speed at which toughness is twice that of a slow cut [m/s]."""
+    work_to_rupture: NotNegative | None = None
+    """Energy that it takes to stretch a volume until it breaks [J/m3]: what a blunt edge adds to
+    the toughness."""
+    friction: NotNegative | None = None
+    """Coefficient of friction where cut faces, pieces and the floor touch."""
+    blade_friction: NotNegative | None = None
+    """Coefficient of friction on the faces of the blade."""
+    blade_viscosity: NotNegative | None = None
+    """Shear stress per sliding speed on the faces of the blade [Pa s/m], in addition to
+    friction."""
+    viscous_damping: NotNegative | None = None
+    """Drag: the rate at which slow motion within the tissue dies away [1/s]."""
+    retardation_time: NotNegative | None = None
+    """Viscosity in shear over the shear modulus [s]."""
+    spring_calibration: Positive | None = None
+    """Stiffness of the springs over that of van Gelder's formula. Keep it at 1, unless the law is
+    springs and they were measured on this mesh."""
+
+
+class PresetMaterialTable(MaterialTable, kw_only=True, frozen=True):
+    """`[material]` of a scene: a preset and figures that replace its own, or figures alone."""
+
+    preset: Text | None = None
+    """Name of a material (`scalpel-sim materials`). Without a preset, `law` and `young_modulus` are
+    needed."""
+
+
+class BladeTable(TomlTable, kw_only=True, frozen=True):
+    """`[blade]`: the measures of `tissue.BladeShape`, those of a scalpel where none is given."""
+
+    thickness: NotNegative | None = None
+    """Thickness of the blade [m; a scalpel's: 0.0004]. 0: the blade is a line, as in the paper, and
+    has no other measures."""
+    bevel_degrees: Positive | None = None
+    """Angle between each bevel and the plane of the blade, at most 60 [degree; a scalpel's: 10]."""
+    height: Positive | None = None
+    """Distance from the edge to the back of the blade [m; a scalpel's: 0.006]."""
+    edge_radius: NotNegative | None = None
+    """Radius of the edge: how blunt it is [m; a scalpel's: 0.000001]."""
+
+
+class WorldTable(TomlTable, kw_only=True, frozen=True):
+    """`[world]`: what is around the body."""
+
+    gravity: NotNegative = STANDARD_GRAVITY
+    """Gravity, downwards [m/s2]."""
+    floor: Finite | None = None
+    """Height of a floor [m], below the body: pieces that are cut loose land on it."""
+    table: Finite | None = None
+    """Height of the upper side of a table on which the body lies from the first [m]: a board of
+    1 cm that reaches 8 cm beyond it, and that arms stand clear of."""
+    table_friction: NotNegative | None = None
+    """Coefficient of friction between body and table; that of the material without."""
+    pos: ThreeNumbers = (0.0, 0.0, 0.0)
+    """Origin of the tissue in the world of an arm of your own [m]."""
+    quat: FourNumbers = (1.0, 0.0, 0.0, 0.0)
+    """Rotation of the tissue there: w, x, y, z."""
+
+
+class SolverTable(TomlTable, kw_only=True, frozen=True):
+    """`[solver]`: how the mesh is cut, and how the motion is computed."""
+
+    scheme: Text = "stellar"
+    """How the mesh is cut: stellar, or paper: the paper's own scheme, with its limits."""
+    relaxation: Text = "global"
+    """How the motion is advanced: global, all nodes together by the Runge-Kutta method [default of
+    run]; verlet, the same by a method of second order, up to 1.5 times as fast [default of
+    view]; or hierarchical, the paper's, for springs."""
+    mass_scaling: NotNegative = DEFAULT_MASS_SCALING
+    """Light nodes, of slivers or near the blade, get mass until none is faster than this angular
+    frequency [1/s; 0: off]. The added mass has no weight, and the table tells how much it is."""
+    precision: Text = "single"
+    """Precision of the forces of tetrahedra: single, or double, which takes a third longer.
+    Positions and velocities are double."""
+    threads: Whole = 1
+    """Threads that share the loops over the body, to the same bits, with the relaxation global or
+    verlet; give it no more than there are idle cores."""
+    snap: Share = _CUT.snap
+    """Where the blade passes nearer to a node than this share of the node's size, the cut goes
+    through the node: 0 follows the blade exactly, 1 keeps elements large."""
+    snap_floor: Share | None = None
+    """The same as a share of the mean node size, in any case; that of `snap` without."""
+    guard: Share = _CUT.guard
+    """No new element is thinner than this share of the mean node size, at most 0.5; best is half of
+    snap."""
+    crumb: NotNegative = _CUT.crumb
+    """Volume below which a piece is not cut loose, in mean tetrahedra."""
+    audit: TrueOrFalse = False
+    """Keep an account of the energy: where the work of the blade goes [default of run]. Needs the
+    relaxation global or verlet."""
+
+
+class ArmTable(TomlTable, kw_only=True, frozen=True):
+    """`[arm]`: the arm, and how it is coupled to the tissue."""
+
+    preset: Text = "auto"
+    """Arm that holds the blade: touch, premium, or auto, the first of them that reaches."""
+    model: FileName | None = None
+    """MJCF file of [an arm of your own](#an-arm-of-your-own), in place of a preset."""
+    heel: Text = "heel"
+    """Site of that model at the handle's end of the edge."""
+    tip: Text = "tip"
+    """Site at the sharp end."""
+    forward: ThreeNumbers = (0.0, 0.0, -1.0)
+    """Direction in which the edge cuts, in the frame of its body."""
+    force: Positive | None = None
+    """Largest force that it can render [N]; any without."""
+    torque: Positive | None = None
+    """Largest torque [N m]; any without."""
+    tissue_every: Every = 1
+    """Ask the tissue once in so many milliseconds; in between the arm feels its last answer and its
+    local stiffness."""
+    coupling: Text = "rigid"
+    """How the arm's blade is coupled to the one that cuts: rigid, they are one; or virtual, by a
+    spring and a damper, and the arm feels nothing stiffer."""
+    coupling_stiffness: Positive | None = None
+    """Stiffness of a virtual coupling [N/m; default: 700]."""
+    coupling_damping: NotNegative | None = None
+    """Damping of a virtual coupling [N s/m; default: twice what is needed for stability]."""
+    passivity: TrueOrFalse = True
+    """Damp motion by which the coupling would create energy. It is counted anyway."""
+
+
+class AttachmentTable(TomlTable, kw_only=True, frozen=True):
+    """`[[attachment]]`: springs from the nodes of a region to a frame; with `to`, a ligament."""
+
+    where: Region
+    """Region whose nodes it holds, as for `fixed`; of a box or a sphere also the nodes inside."""
+    stiffness: Positive
+    """Stiffness of all springs together [N/m]."""
+    damping: NotNegative = 0.0
+    """Damping of all dampers together [N s/m]."""
+    rest_length: NotNegative | None = None
+    """Length up to which each spring is slack [m]; 0 without, and of a ligament its length at
+    first."""
+    breaks_at: Positive | None = None
+    """Force at which it releases the tissue [N]; none without."""
+    to: ThreeNumbers | None = None
+    """Where the strands of a [ligament](own_arm.md#ligaments) end [m]. It has `area` and
+    `toughness` too."""
+    area: Positive | None = None
+    """Cross-section of all strands together [m2]."""
+    toughness: Positive | None = None
+    """Energy of cutting the strands [J/m2]."""
+    displacements: RowsOfThree | None = None
+    """How far the frame, or the other ends of a ligament, are moved from where they are at first,
+    row by row [m]."""
+    times: Times | None = None
+    """When the frame is there, a time for each row [s]."""
+    speed: Positive | None = None
+    """Speed of the frame, in place of times [m/s]."""
+    release_at: NotNegative | None = None
+    """When it releases the tissue [s]."""
+
+
+class WaypointTable(TomlTable, kw_only=True, frozen=True):
+    """A row of `motion`: where a grasper rests at an instant; what is left out is as before."""
+
+    time: NotNegative
+    """When the grasper is there [s]."""
+    at: ThreeNumbers | None = None
+    """Middle between the pads [m]."""
+    approach: ThreeNumbers | None = None
+    """Direction in which shaft and pads point ([0, 0, -1] at first)."""
+    across: ThreeNumbers | None = None
+    """Direction in which the jaws open ([1, 0, 0] at first)."""
+    opening: Opening | None = None
+    """Distance between the pads, at most 0.02 [m]."""
+
+
+class GrasperTable(TomlTable, kw_only=True, frozen=True):
+    """`[[grasper]]`: an arm that holds a grasper, led along a motion, or as a hand has led it."""
+
+    name: Name = "left"
+    """Name: its columns in `forces.csv` begin with it, and its parts in the model."""
+    preset: Text | None = None
+    """Its arm: auto, touch or premium; auto without, unless there is a model."""
+    model: FileName | None = None
+    """MJCF file of an arm of your own."""
+    at: Text | None = None
+    """Site or body of that model which holds the grasper, along its +z, as flanges of robots
+    point."""
+    pos: ThreeNumbers | None = None
+    """Origin of that model in the frame of the tissue [m]; [0, 0, 0] without."""
+    quat: FourNumbers | None = None
+    """Rotation of that model: w, x, y, z; [1, 0, 0, 0] without."""
+    holds: Annotated[Literal["attachment", "friction"], one_of("attachment", "friction")] = (
+        "attachment"
+    )
+    """How tissue is held: by attachment, what is between the pads when they have closed is tied to
+    the grasper by springs; or by friction, shaft, jaws and pads touch the tissue, and friction
+    (0.6) holds it."""
+    stiffness: Positive | None = None
+    """Stiffness of the attachment [N/m]; 2000 without."""
+    damping: NotNegative | None = None
+    """Damping of the attachment [N s/m]; 2 without."""
+    breaks_at: Positive | None = None
+    """Force at which what is held slips out [N]; none without."""
+    closed: Positive | None = None
+    """Distance between the pads below which they hold [m]; 0.006 without."""
+    force: Positive | None = None
+    """Largest force of the jaws [N]; 5 without."""
+    motion: Annotated[list[WaypointTable], Meta(min_length=1)] = field(default_factory=list)
+    """Rows of where it rests, and when. Between two it moves, turns and opens along the polynomial
+    of least jerk."""
+    recorded: FileName | None = None
+    """CSV file of what [a hand](live.md#what-is-recorded) did with it, in place of a motion."""
+
+
+class ViewTable(TomlTable, kw_only=True, frozen=True):
+    """`[[view]]`: a camera, which stands still in the frame of the tissue."""
+
+    name: Label
+    """Name on the page, up to 40 characters; each view has its own."""
+    eye: ThreeNumbers
+    """Position of the camera [m]."""
+    target: ThreeNumbers
+    """Point in the middle of the picture [m]."""
+    up: ThreeNumbers = (0.0, 0.0, 1.0)
+    """Direction that points to the upper side of the picture; not along the line of sight."""
+    fov_degrees: Angle = DEFAULT_FOV
+    """Angle from the lower to the upper side of the picture, above 0 and below 180 [degree]."""
