@@ -16,10 +16,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.random_stroke import STROKE_DT, STROKE_FLOOR, random_stroke
 from scalpel_sim import SCENES
-from scalpel_sim.bench.random_strokes import STROKE_DT, STROKE_FLOOR, random_stroke
-from scalpel_sim.preparation.tissue import make_tissue
-from scalpel_sim.scene.scene import changed
+from scalpel_sim.scene_body import make_tissue
 from tissue import BladeSweep, Energies
 
 CLOSED = 0.01

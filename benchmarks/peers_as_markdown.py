@@ -6,10 +6,10 @@ Usage: PYTHONPATH=. python benchmarks/peers_as_markdown.py FILE
 import sys
 from pathlib import Path
 
-from scalpel_sim.bench.peer_benchmark import ratio_to
-from scalpel_sim.bench.peer_cases import OURS, OURS_SOLID, OURS_SPRINGS, PEERS
-from scalpel_sim.bench.results import load_results
-from scalpel_sim.bench.tables import three_digits
+from benchmarks.peers.benchmark import ratio_to
+from benchmarks.peers.cases import OURS, OURS_SOLID, OURS_SPRINGS, PEERS
+from scalpel_sim.validate.speed.measurements import load_results
+from scalpel_sim.validate.speed.tables import three_digits
 
 
 def main() -> None:

@@ -9,9 +9,9 @@ takes the memory of an earlier one, as a state that is saved in each frame to go
 
 import sys
 
+from benchmarks.timing import median_milliseconds
 from bridge import InProcessLink
 from scalpel_sim import SCENES, Simulation, prepare
-from scalpel_sim.bench.timing import median_milliseconds
 from tissue import TissueState
 
 N_TIMES = 50

@@ -6,9 +6,9 @@ Usage: PYTHONPATH=. python benchmarks/surface_values.py [SCENE], on an idle mach
 import sys
 from typing import get_args
 
+from benchmarks.timing import median_milliseconds
 from bridge import InProcessLink
 from scalpel_sim import SCENES, prepare
-from scalpel_sim.bench.timing import median_milliseconds
 from tissue import SurfaceQuantity
 
 N_TIMES = 100

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from scalpel_sim.bench.random_strokes import STROKE_DT, random_stroke
+from benchmarks.random_stroke import STROKE_DT, random_stroke
 from tests.bodies import sides
 from tissue import (
     BladeSegment,

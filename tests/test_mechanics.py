@@ -12,7 +12,7 @@ import pytest
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import cg
 
-from benchmarks.mesh_study import MODES, Bar, Model
+from benchmarks.studies.mesh_study import MODES, Bar, Model
 from tests import bodies
 from tests.materials import SPRINGS
 from tests.tissue.kernels_of import cut_of

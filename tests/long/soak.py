@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.random_stroke import random_stroke
 from bridge import LinkError, TcpLink
 from scalpel_sim import SCENES, Simulation, Viewer, prepare
-from scalpel_sim.bench.random_strokes import random_stroke
 from scalpel_sim.hands.commands import Engage, Move, Turn
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.preparation.tissue import make_tissue

@@ -1,0 +1,220 @@
+"""The engine's inner loops, one at a time: the only file here that reaches inside `tissue`."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.blocks import held_nodes, jittered_block
+from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
+from tissue.contact.response.forces import add_contact_forces, end_contact_substep
+from tissue.contact.self_contact import SelfContact
+from tissue.core.jit import kernel
+from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
+from tissue.elasticity.energy_density import neo_hookean
+from tissue.integrators.global_stepper import GlobalStepper, method_of
+from tissue.integrators.options import Global
+from tissue.integrators.runge_kutta import accelerations
+from tissue.integrators.step_context import Increment
+from tissue.mesh.body import Body
+from tissue.tissue import NOWHERE
+
+FRAME_DT = 1e-3
+"""Time step of a frame [s]: that of a haptic loop."""
+
+YOUNG_MODULUS = 3e3
+"""Young's modulus of the blocks [Pa]: so soft that in cells of 10 mm a step of 1 ms is stable under
+every explicit scheme that is measured here, those of other engines too."""
+POISSON_RATIO: dict[Law, float] = {"springs": 0.25, "neo_hookean": 0.3}
+"""Poisson's ratio under each law: that of springs without a volume term, and what other engines get
+under their laws for tetrahedra."""
+DENSITY = 1e3
+"""Density [kg/m3]."""
+_TOUGHNESS = 5.0
+"""Toughness [J/m2], so low that the engine does not warn of too coarse a mesh; nothing is cut."""
+
+LAW_NAMES: dict[Law, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
+"""The laws that are measured, and their names in the tables."""
+
+VECTOR_LENGTH: int = WIDTH
+"""Numbers in one of the engine's vectors."""
+
+
+def block_material(law: Law, *, is_damped: bool = True) -> Material:
+    """Return the material of the blocks, with the default damping or with none along edges."""
+    material = Material(
+        young_modulus=YOUNG_MODULUS,
+        density=DENSITY,
+        toughness=_TOUGHNESS,
+        law=law,
+        poisson_ratio=POISSON_RATIO[law],
+    )
+    return material if is_damped else replace(material, retardation_time=0.0)
+
+
+class EngineLoops:
+    """A block of tissue, and the loops that advance it.
+
+    Each method runs its loop `n` times, as `timing.Case` asks for.
+
+    Args:
+        mesh: The block.
+        law: Law of elasticity.
+        is_damped: Whether there are dampers along the edges.
+        is_averaged: Whether dilatation is averaged over nodes, as the engine does, or taken in
+            each tetrahedron, as other engines do.
+        precision: Of the forces of tetrahedra, `double` or `single`.
+    """
+
+    def __init__(
+        self,
+        mesh: TetrahedralMesh,
+        law: Law = "springs",
+        *,
+        is_damped: bool = True,
+        is_averaged: bool = True,
+        precision: str = "double",
+    ) -> None:
+        material = block_material(law, is_damped=is_damped)
+        self._stepper = GlobalStepper(method_of(Global(damping="step"), law))
+        solver = SolverSettings(relaxation=Global(damping="step"), precision=precision)
+        self._tissue = Tissue(mesh, material, fixed=held_nodes(mesh), solver=solver)
+        if not is_averaged:
+            elasticity = self._tissue._system.elasticity
+            plain = neo_hookean(material.mu, material.lam, averaged=False)
+            arrays = elasticity.arrays
+            elasticity.arrays = arrays.replaced(solid=arrays.solid.replaced(law=plain))
+
+    def forces(self, n: int) -> None:
+        """Evaluate the forces on all nodes, and the accelerations that follow."""
+        system = self._tissue._system
+        # With the dampers among the forces; the engine's own steps let them act in between.
+        damped = system.context.replaced(surroundings=system.surroundings)
+        for _ in range(n):
+            accelerations(damped, system.stages.a1)
+
+    def euler_steps(self, n: int) -> None:
+        """Take steps of the symplectic Euler method: one evaluation of the forces each.
+
+        The engine itself steps otherwise; other engines step like this, so like is compared with
+        like.
+        """
+        body = self._tissue._body
+        for _ in range(n):
+            self.forces(1)
+            _kick_and_drift(body, self._tissue._system.stages.a1, FRAME_DT)
+
+    def runge_kutta_steps(self, n: int) -> None:
+        """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
+        increment = Increment(NOWHERE, n * FRAME_DT, 0.0, 1.0)
+        self._stepper.take_steps(self._tissue._system, increment, n)
+
+    def frames(self, n: int) -> None:
+        """Advance the body by whole frames, without a blade."""
+        for _ in range(n):
+            self._tissue.step(None, FRAME_DT)
+
+    @property
+    def springs_per_node(self) -> list[int]:
+        """Number of springs at each node."""
+        counts = self._tissue._system.elasticity.arrays.springs.count[: self._tissue.n_nodes]
+        return [int(count) for count in counts]
+
+    @property
+    def positions(self) -> FloatArray:
+        """Positions of the nodes [m], shape (n_nodes, 3)."""
+        return self._tissue.snapshot().positions
+
+
+class TouchingBlocks:
+    """Two blocks, one of which lies on the other: search for contacts, and their forces."""
+
+    N_SETTLING = 100
+    """Frames in which the upper block comes to rest."""
+
+    def __init__(self, n_tetrahedra: int) -> None:
+        lower = jittered_block(n_tetrahedra)
+        height = float(np.ptp(lower.positions[:, 2]))
+        upper = lower.positions + np.array([0.0, 0.0, height])
+        mesh = TetrahedralMesh(
+            np.vstack([lower.positions, upper]),
+            np.vstack([lower.tetrahedra, lower.tetrahedra + len(upper)]),
+        )
+        fixed = np.zeros(len(mesh.positions), dtype=bool)
+        fixed[: len(upper)] = held_nodes(lower)
+        self._tissue = Tissue(mesh, block_material("springs"), fixed=fixed)
+        for _ in range(self.N_SETTLING):
+            self._tissue.step(None, FRAME_DT)
+
+    @property
+    def _contact(self) -> SelfContact:
+        contact = self._tissue._system.contact
+        assert isinstance(contact, SelfContact)
+        return contact
+
+    @property
+    def n_contacts(self) -> int:
+        """Number of contacts that press."""
+        return int(self._contact.forces.n_pressing)
+
+    def searches_anew(self, n: int) -> None:
+        """Find all pairs that may touch anew, as after all nodes have moved far, and contacts.
+
+        The searches of `searches` are part of it.
+        """
+        search = self._contact._search
+        for _ in range(n):
+            search.pairs.n_updates += 1  # all nodes count as new
+            search.is_pairing_due = 1
+            self.searches(1)
+
+    def searches(self, n: int) -> None:
+        """Find the contacts, as in every time step."""
+        system = self._tissue._system
+        for _ in range(n):
+            system.contact.begin()
+            system.find_contacts(FRAME_DT)
+
+    def forces(self, n: int) -> None:
+        """Evaluate the forces of the contacts, and let them slide, as in every Verlet step."""
+        system, body, contacts = self._tissue._system, self._tissue._body, self._contact.forces
+        x, v, external = body.positions, body.velocities, system.stages.external
+        for _ in range(n):
+            add_contact_forces(contacts, x, v, FRAME_DT, external)
+            end_contact_substep(contacts, x, v, external)
+
+
+@kernel
+def _kick_and_drift(body: Body, accelerations: FloatArray, dt: float) -> None:
+    for i in range(body.n_nodes):
+        for c in range(3):
+            body.velocities[i, c] += dt * accelerations[i, c]
+            body.positions[i, c] += dt * body.velocities[i, c]
+
+
+@kernel
+def triad_pass(a: FloatArray, b: FloatArray, c: FloatArray, n: int) -> None:
+    """Compute a = b + s c over whole arrays, `n` times, with another `s` each time."""
+    for k in range(n):
+        s = 1.0 / (k + 1.0)
+        for i in range(len(a)):
+            a[i] = b[i] + s * c[i]
+
+
+@kernel
+def multiply_and_add(values: FloatArray, n: int) -> None:
+    """Multiply eight vectors and add to them, `n` times; `values` has eight vectors."""
+    a, b = load_lanes(values, 0), load_lanes(values, WIDTH)
+    c, d = load_lanes(values, 2 * WIDTH), load_lanes(values, 3 * WIDTH)
+    e, f = load_lanes(values, 4 * WIDTH), load_lanes(values, 5 * WIDTH)
+    g, h = load_lanes(values, 6 * WIDTH), load_lanes(values, 7 * WIDTH)
+    factor, term = lanes(0.5), lanes(1.0)
+    for _ in range(n):
+        a = a * factor + term
+        b = b * factor + term
+        c = c * factor + term
+        d = d * factor + term
+        e = e * factor + term
+        f = f * factor + term
+        g = g * factor + term
+        h = h * factor + term
+    store_lanes(values, 0, a + b + c + d + e + f + g + h)

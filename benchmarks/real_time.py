@@ -1,0 +1,307 @@
+"""Does it run in real time, and does that last? Whole strokes, and frames after random strokes."""
+
+import itertools
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from benchmarks.random_stroke import STROKE_DT, STROKE_FLOOR, random_stroke
+from benchmarks.timing import WALL
+from scalpel_sim.errors import UsageError
+from scalpel_sim.preparation import prepare
+from scalpel_sim.run import run_time
+from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.scene_parts.choices import can_audit
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scenes import scene_called
+from scalpel_sim.simulation import Simulation, no_garbage_collection
+from scalpel_sim.tables.material import material_called
+from scalpel_sim.validate.speed.measurements import (
+    COUNTED,
+    HIGHER,
+    NEITHER,
+    BenchmarkResult,
+    Measurement,
+    Quantity,
+    Skipped,
+    summarise_times,
+    summarise_values,
+)
+from scalpel_sim.validate.speed.tables import compact_table, print_skipped, three_digits
+from scalpel_sim.validate.speed.watch import SILENT, Watch
+from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+AS_SHIPPED = "as shipped"
+"""Stands for the material of the scene itself."""
+MODES = ("plain", "account", "viewer")
+STROKE_COUNTS = (0, 10, 26, 50)
+"""After how many random strokes a frame is timed."""
+QUICK_SECONDS = 0.05
+"""How much of a stroke is simulated for a quick look [s]."""
+REST_FRAMES = 200
+"""Frames at rest that are timed after random strokes."""
+_SEED = 0
+_MS_PER_S = 1e3
+
+_ABOUT = (
+    "Wall time of a frame of 1 ms; other work on the machine counts. Factor: simulated seconds per "
+    "second. Late: frames that took longer than they simulate. Steps: of the relaxation in a frame,"
+    " median and most. Account: with an account of the energy. Viewer: with the live page served, "
+    "also where no browser has it open. Stroke: the arm does the scene's whole stroke. After "
+    "random strokes: the tissue alone, at rest and while the next stroke cuts."
+)
+
+
+class TimedRun(NamedTuple):
+    """One line of the table."""
+
+    scene: str
+    material: str
+    what: str
+    """One of `MODES`, or what is done after how many random strokes."""
+
+    @property
+    def name(self) -> str:
+        """Its name in results files."""
+        return f"{self.scene}, {self.material}: {self.what}"
+
+
+class Frames(NamedTuple):
+    """The frames of one turn."""
+
+    tetrahedra: int
+    dt: float
+    """Simulated time of a frame [s]."""
+    seconds: FloatArray
+    """Wall time of each [s]."""
+    substeps: FloatArray
+    added_mass: float
+    """The most mass that was added to light nodes, as a share of the body's own."""
+
+
+def checked_materials(names: Sequence[str]) -> list[str]:
+    """Return the materials asked for; where none is named, that of the scene and all by name.
+
+    Raises:
+        UsageError: there is no material of that name.
+    """
+    for name in names:
+        if name != AS_SHIPPED:
+            material_called(name)
+    return list(names) or [AS_SHIPPED, *MATERIALS]
+
+
+def checked_strokes(counts: Sequence[int]) -> list[int]:
+    """Return after how many strokes frames are timed, in order.
+
+    Raises:
+        UsageError: a number is negative.
+    """
+    if any(count < 0 for count in counts):
+        raise UsageError(f"--strokes is {', '.join(map(str, counts))}; a count is 0 or more")
+    return sorted(set(counts))
+
+
+def measure_real_time(
+    n_rounds: int,
+    scenes: Sequence[str],
+    materials: Sequence[str],
+    strokes: Sequence[int] = STROKE_COUNTS,
+    *,
+    quick: bool = False,
+    watch: Watch = SILENT,
+) -> BenchmarkResult:
+    """Do the stroke of each scene in each material, and random strokes; cases take turns.
+
+    Args:
+        n_rounds: Number of rounds.
+        scenes: Names of scenes.
+        materials: Names of materials; `AS_SHIPPED` for that of the scene.
+        strokes: After how many random strokes frames are timed; they are done once.
+        quick: Whether to simulate only the begin of each scene's stroke, and to time only the
+            middle of each random one.
+        watch: Receives the progress.
+    """
+    pairs = list(itertools.product(scenes, materials))
+    cases = [TimedRun(*pair, mode) for pair in pairs for mode in MODES]
+    seconds = QUICK_SECONDS if quick else None
+    found: dict[TimedRun, list[Frames]] = {}
+    skipped: list[Skipped] = []
+    watch.begin(n_rounds * len(cases) + len(pairs) * len(strokes))
+    for case in cases * n_rounds:
+        try:
+            found.setdefault(case, []).append(_stroke_frames(case, seconds))
+        except (TissueError, ValueError) as error:
+            skipped.append(Skipped("real-time", case.name, None, str(error)))
+        watch.tick(case.name)
+    for pair in pairs:
+        try:
+            for case, frames in _random_stroke_frames(*pair, strokes, seconds, watch):
+                found.setdefault(case, []).append(frames)
+        except TissueError as error:
+            skipped.append(Skipped("real-time", f"{', '.join(pair)}: strokes", None, str(error)))
+    found = {case: turns for case, turns in found.items() if turns}
+    measured = [each for case, turns in found.items() for each in _measurements(case, turns)]
+    return BenchmarkResult(measured, skipped, partial(_print, found, skipped))
+
+
+def _scene(name: str, material: str) -> Scene:
+    """Return a scene in a material."""
+    scene = scene_called(name)
+    return scene if material == AS_SHIPPED else changed(scene, material=material_called(material))
+
+
+def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
+    """Do the stroke of a scene once."""
+    scene = _scene(case.scene, case.material)
+    audit = case.what == "account" and can_audit(scene.solver.relaxation)
+    simulation = prepare(changed(scene, audit=audit))
+    n_tetrahedra = simulation.link.describe().n_tetrahedra
+    substeps: list[int] = []
+
+    def count(now: Simulation) -> bool:
+        substeps.append(now.result.n_substeps)
+        return False
+
+    with ExitStack() as scope:
+        if case.what == "viewer":
+            from scalpel_sim.viewer.pictures import into_viewer
+            from scalpel_sim.viewer.viewer import Viewer
+
+            viewer = Viewer(simulation.arm.model, title=case.name, frame=simulation.frame)
+            simulation.pictures.append(into_viewer(scope.enter_context(viewer)))
+        simulation.run(run_time(simulation, seconds), count)
+    return Frames(
+        n_tetrahedra,
+        simulation.dt,
+        simulation.recording.column("frame_s").copy(),
+        np.array(substeps, dtype=np.float64),
+        simulation.link.cut_report().now.most_added_mass,
+    )
+
+
+def _random_stroke_frames(
+    name: str, material: str, counts: Sequence[int], seconds: float | None, watch: Watch
+) -> list[tuple[TimedRun, Frames]]:
+    """Time frames after random strokes on one body: at rest, and in the stroke that follows."""
+    scene = changed(_scene(name, material), audit=False, floor=STROKE_FLOOR, table=None)
+    tissue = make_tissue(scene)  # no table: strokes come from all sides
+    random = np.random.default_rng(_SEED)
+    found, done = [], 0
+    for count in counts:
+        for _ in range(done, count):
+            _cut(tissue, random, None)
+        n_rest = REST_FRAMES if seconds is None else round(seconds / STROKE_DT)
+        at_rest = _timed(tissue, [None] * n_rest)
+        found.append((TimedRun(name, material, f"{count} strokes, at rest"), at_rest))
+        in_stroke = _cut(tissue, random, seconds)
+        found.append((TimedRun(name, material, f"{count} strokes, cutting"), in_stroke))
+        done = count + 1
+        watch.tick(f"{name}, {material}: {count} strokes")
+    return found
+
+
+def _cut(tissue: Tissue, random: np.random.Generator, seconds: float | None) -> Frames:
+    """Do a random stroke and time its frames; for a quick look, those in its middle."""
+    edges = random_stroke(tissue, random)
+    frames = _timed(tissue, [BladeSweep(*pair) for pair in itertools.pairwise(edges)])
+    if seconds is None:
+        return frames
+    n = round(seconds / STROKE_DT)
+    middle = slice((len(frames.seconds) - n) // 2, (len(frames.seconds) + n) // 2)
+    return frames._replace(seconds=frames.seconds[middle], substeps=frames.substeps[middle])
+
+
+def _timed(tissue: Tissue, sweeps: Sequence[BladeSweep | None]) -> Frames:
+    """Do frames and time each."""
+    taken, substeps = [], []
+    n_tetrahedra = tissue.n_tetrahedra
+    with no_garbage_collection():
+        for sweep in sweeps:
+            began = time.perf_counter()
+            result = tissue.step(sweep, STROKE_DT)
+            taken.append(time.perf_counter() - began)
+            substeps.append(result.n_substeps)
+    return Frames(
+        n_tetrahedra,
+        STROKE_DT,
+        np.array(taken),
+        np.array(substeps, dtype=np.float64),
+        tissue.cut_report().now.most_added_mass,
+    )
+
+
+def _measurements(case: TimedRun, turns: Sequence[Frames]) -> list[Measurement]:
+    """Return the measurements of one case."""
+
+    def quantity(name: str, unit: str, clock: str = WALL.name, better: str = "lower") -> Quantity:
+        return Quantity("real-time", case.name, turns[0].tetrahedra, name, unit, clock, better)
+
+    seconds = [turn.seconds for turn in turns]
+    measured = [
+        summarise_times(quantity("frame", "ms"), seconds, lambda s: _MS_PER_S * s),
+        summarise_times(
+            quantity("substeps", "steps", COUNTED), [turn.substeps for turn in turns], float
+        ),
+    ]
+    added = [turn.added_mass for turn in turns]
+    for name, unit, clock, better, values in (
+        ("p99.9 of a frame", "ms", WALL.name, "lower", [_p999(turn) for turn in turns]),
+        ("real-time factor", "s/s", WALL.name, HIGHER, [_factor(turn) for turn in turns]),
+        ("late frames", "%", WALL.name, NEITHER, [_late(turn) for turn in turns]),
+        ("added mass", "%", COUNTED, NEITHER, [100.0 * share for share in added]),
+    ):
+        if values:
+            measured.append(summarise_values(quantity(name, unit, clock, better), values))
+    return measured
+
+
+def _p999(turn: Frames) -> float:
+    """Return the 99.9th percentile of a frame [ms]."""
+    return _MS_PER_S * float(np.percentile(turn.seconds, 99.9))
+
+
+def _factor(turn: Frames) -> float:
+    """Return simulated time over wall time."""
+    return len(turn.seconds) * turn.dt / float(turn.seconds.sum())
+
+
+def _late(turn: Frames) -> float:
+    """Return the share of frames that took longer than they simulate [%]."""
+    return 100.0 * float((turn.seconds > turn.dt).mean())
+
+
+def _print(
+    found: dict[TimedRun, list[Frames]], skipped: Sequence[Skipped], console: "Console"
+) -> None:
+    """Print a line for each case."""
+    table = compact_table("real time")
+    table.add_column("case")
+    for heading in ("factor", "median ms", "p99", "p99.9", "late %", "steps", "added %"):
+        table.add_column(heading, justify="right")
+    body = None
+    for case, turns in sorted(found.items(), key=lambda item: item[0][:2]):
+        if body != case[:2]:
+            body = case[:2]
+            table.add_row(f"[bold]{case.scene}, {case.material}[/bold]")
+        milliseconds = _MS_PER_S * np.concatenate([turn.seconds for turn in turns])
+        steps = np.concatenate([turn.substeps for turn in turns])
+        added = turns[-1].added_mass
+        table.add_row(
+            f"{case.what}, {turns[0].tetrahedra:,} tets",
+            three_digits(float(np.median([_factor(turn) for turn in turns]))),
+            *(three_digits(float(p)) for p in np.percentile(milliseconds, (50, 99, 99.9))),
+            three_digits(float(np.mean([_late(turn) for turn in turns]))),
+            f"{np.median(steps):.0f}, {steps.max():.0f}",
+            "" if added is None else three_digits(100.0 * added),
+        )
+    console.print(table)
+    print_skipped(skipped, console)
+    console.print(_ABOUT, style="dim")
