@@ -1,11 +1,21 @@
-"""The engine's inner loops, one at a time: the only file here that reaches inside `tissue`."""
+"""The blocks that benchmarks measure on, and the engine's inner loops over them, one at a time."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.blocks import held_nodes, jittered_block
-from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
+from scalpel_sim.errors import UsageError
+from tissue import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Law,
+    Material,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+)
 from tissue.contact.response.forces import add_contact_forces, end_contact_substep
 from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
@@ -17,6 +27,29 @@ from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
 from tissue.tissue import NOWHERE
+
+BlockCells = tuple[int, int, int]
+"""Numbers of cells of a block along x, y and z."""
+
+CELL = 0.01
+"""Side of a cell [m]."""
+JITTER = 0.1
+"""Largest displacement of an inner node from the grid, in cells: no two tetrahedra are alike, as in
+an organ."""
+SEED = 1998
+"""Seed of the jitter: every run measures the same blocks."""
+
+BLOCKS: dict[int, BlockCells] = {
+    576: (4, 4, 6),
+    5_400: (9, 10, 10),
+    6_000: (10, 10, 10),
+    20_250: (15, 15, 15),
+    60_000: (20, 20, 25),
+    199_800: (30, 30, 37),
+    600_000: (40, 50, 50),
+    1_000_188: (49, 54, 63),
+}
+"""Number of cells along x, y and z, by the number of tetrahedra."""
 
 FRAME_DT = 1e-3
 """Time step of a frame [s]: that of a haptic loop."""
@@ -37,6 +70,49 @@ LAW_NAMES: dict[Law, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
 
 VECTOR_LENGTH: int = WIDTH
 """Numbers in one of the engine's vectors."""
+
+
+def jittered_block(n_tetrahedra: int) -> TetrahedralMesh:
+    """Return the block of that many tetrahedra, one of `BLOCKS`."""
+    cells = BLOCKS[n_tetrahedra]
+    mesh = block(cells, [CELL * n for n in cells])
+    off = np.random.default_rng(SEED).uniform(-JITTER, JITTER, mesh.positions.shape) * CELL
+    on_surface = _is_on_sides(mesh.positions, (0, 1, 2))
+    positions = mesh.positions + np.where(on_surface[:, None], 0.0, off)
+    return TetrahedralMesh(positions, mesh.tetrahedra)
+
+
+def held_nodes(mesh: TetrahedralMesh) -> BoolArray:
+    """Return which nodes are held, shape (n_nodes,): those on the sides across x and y.
+
+    The body sags between them.
+    """
+    return _is_on_sides(mesh.positions, (0, 1))
+
+
+def _is_on_sides(positions: FloatArray, axes: tuple[int, ...]) -> BoolArray:
+    """Return which nodes lie on the sides of the block across these axes."""
+    along = positions[:, axes]
+    near = 0.5 * JITTER * CELL
+    low, high = along < along.min(axis=0) + near, along > along.max(axis=0) - near
+    return np.asarray(np.any(low | high, axis=1))
+
+
+def sizes_up_to(sizes: tuple[int, ...], largest: int | None) -> tuple[int, ...]:
+    """Return the sizes that are not above the largest one wanted; None: all of them.
+
+    Raises:
+        UsageError: no size is left.
+    """
+    if largest is None:
+        return sizes
+    left = tuple(n for n in sizes if n <= largest)
+    if not left:
+        raise UsageError(
+            f"--largest is {largest}; the smallest body of this benchmark has {min(sizes)} "
+            "tetrahedra"
+        )
+    return left
 
 
 def block_material(law: Law, *, is_damped: bool = True) -> Material:
@@ -120,6 +196,22 @@ class EngineLoops:
         return [int(count) for count in counts]
 
     @property
+    def springs(self) -> tuple[IntArray, FloatArray]:
+        """Nodes of each spring, shape (n_springs, 2), and stiffness [N/m], shape (n_springs,)."""
+        rows = self._tissue._system.elasticity.arrays.springs
+        node = np.repeat(np.arange(self._tissue.n_nodes), self.springs_per_node)
+        within = np.concatenate([np.arange(n) for n in self.springs_per_node])
+        slots = rows.first[node] + within
+        is_first = node < rows.neighbour[slots]  # each spring stands in the rows of both nodes
+        ends = np.stack([node, rows.neighbour[slots]], axis=1)[is_first]
+        return ends, rows.stiffness[slots][is_first]
+
+    @property
+    def masses(self) -> FloatArray:
+        """Masses of the nodes [kg], shape (n_nodes,)."""
+        return self._tissue.snapshot().masses
+
+    @property
     def positions(self) -> FloatArray:
         """Positions of the nodes [m], shape (n_nodes, 3)."""
         return self._tissue.snapshot().positions
@@ -156,8 +248,8 @@ class TouchingBlocks:
         """Number of contacts that press."""
         return int(self._contact.forces.n_pressing)
 
-    def searches_anew(self, n: int) -> None:
-        """Find all pairs that may touch anew, as after all nodes have moved far, and contacts.
+    def new_searches(self, n: int) -> None:
+        """Find the pairs that may touch as after all nodes have moved far, and the contacts.
 
         The searches of `searches` are part of it.
         """

@@ -1,24 +1,22 @@
 """The engine's loops one by one: forces, steps, a cut step, and contact."""
 
-from functools import partial
-
-from benchmarks.blocks import jittered_block, sizes_up_to
-from benchmarks.cut import CUT_BLOCKS, measure_cut_steps
-from benchmarks.engine import LAW_NAMES, EngineLoops, TouchingBlocks
-from benchmarks.timing import CPU, Case, time_in_turns
+from benchmarks.engine import LAW_NAMES, EngineLoops, TouchingBlocks, jittered_block, sizes_up_to
+from benchmarks.scaling import SMALLEST_CUT, cut
+from benchmarks.timing import Case, Largest, Rounds, TurnWatch, time_in_turns
 from scalpel_sim.validate.speed.measurements import (
+    CPU,
     BenchmarkResult,
     Measurement,
     Quantity,
     summarise_times,
 )
-from scalpel_sim.validate.speed.tables import print_measurements
-from scalpel_sim.validate.speed.watch import SILENT, Watch
+from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.watch import SILENT
 from tissue import FloatArray
 
 _SIZES = (576, 5_400, 20_250, 60_000)
 """Sizes of the blocks [tetrahedra]."""
-TOUCHING_SIZE = 5_400
+_TOUCHING_SIZE = 5_400
 """Size of each of the two blocks that touch [tetrahedra]."""
 _NS_PER_S, _US_PER_S = 1e9, 1e6
 
@@ -30,10 +28,10 @@ _ABOUT = (
 )
 
 
-def measure_kernels(
-    n_rounds: int, largest: int | None = None, watch: Watch = SILENT
+def kernels(
+    runs: Rounds = 5, watch: TurnWatch = SILENT, *, largest: Largest = None
 ) -> BenchmarkResult:
-    """Time every loop, at each size up to the largest."""
+    """Time forces, steps, a cut step and contact detection in 576 to 60,000 tetrahedra."""
     sizes = sizes_up_to(_SIZES, largest)
     cases: list[Case] = []
     quantities: list[Quantity] = []
@@ -48,20 +46,19 @@ def measure_kernels(
                 name = f"{law_name}: {what}"
                 cases.append(Case(f"{name}, {size:,}", run))
                 quantities.append(Quantity("kernels", name, size, "time", "ns/tet", CPU.name))
-    touching_size = min(TOUCHING_SIZE, sizes[-1])
+    touching_size = min(_TOUCHING_SIZE, sizes[-1])
     touching = TouchingBlocks(touching_size)
     for name, run in (
-        ("contact: search anew", touching.searches_anew),
+        ("contact: new search", touching.new_searches),
         ("contact: search", touching.searches),
         ("contact: forces of a step", touching.forces),
     ):
         cases.append(Case(name, run))
         quantities.append(Quantity("kernels", name, 2 * touching_size, "time", "µs", CPU.name))
-    taken = time_in_turns(cases, n_rounds, clock=CPU, watch=watch)
+    taken = time_in_turns(cases, runs, clock=CPU, watch=watch)
     measured = [_summary(each, rounds) for each, rounds in zip(quantities, taken, strict=True)]
-    measured += measure_cut_steps(n_rounds, CUT_BLOCKS[:1], watch).measurements
-    show = partial(print_measurements, "kernels", measured, [], about=_ABOUT)
-    return BenchmarkResult(measured, [], show)
+    measured += cut(runs, watch, largest=SMALLEST_CUT).measurements
+    return as_rows("kernels", measured, about=_ABOUT)
 
 
 def _summary(quantity: Quantity, rounds: list[FloatArray]) -> Measurement:

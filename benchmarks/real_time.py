@@ -5,25 +5,26 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
+from cyclopts import Parameter
 
-from benchmarks.random_stroke import STROKE_DT, STROKE_FLOOR, random_stroke
-from benchmarks.timing import WALL
+from benchmarks.strokes import STROKE_DT, STROKE_FLOOR, random_stroke
+from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.errors import UsageError
-from scalpel_sim.preparation import prepare
-from scalpel_sim.run import run_time
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_parts.choices import can_audit
-from scalpel_sim.scene_parts.scene import Scene
-from scalpel_sim.scenes import scene_called
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.runs.run import run_time
+from scalpel_sim.scene.checks import can_audit
+from scalpel_sim.scene.read import scene_called
+from scalpel_sim.scene.scene import Scene, changed, material_called
 from scalpel_sim.simulation import Simulation, no_garbage_collection
-from scalpel_sim.tables.material import material_called
 from scalpel_sim.validate.speed.measurements import (
     COUNTED,
     HIGHER,
     NEITHER,
+    WALL,
     BenchmarkResult,
     Measurement,
     Quantity,
@@ -31,16 +32,19 @@ from scalpel_sim.validate.speed.measurements import (
     summarise_times,
     summarise_values,
 )
-from scalpel_sim.validate.speed.tables import compact_table, print_skipped, three_digits
+from scalpel_sim.validate.speed.scenes import checked_scene_names
+from scalpel_sim.validate.speed.tables import compact_table, print_notes, three_digits
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+Names = Annotated[Sequence[str], Parameter(consume_multiple=True)]
+
 AS_SHIPPED = "as shipped"
 """Stands for the material of the scene itself."""
-MODES = ("plain", "account", "viewer")
+RUN_MODES = ("plain", "account", "viewer")
 STROKE_COUNTS = (0, 10, 26, 50)
 """After how many random strokes a frame is timed."""
 QUICK_SECONDS = 0.05
@@ -65,7 +69,7 @@ class TimedRun(NamedTuple):
     scene: str
     material: str
     what: str
-    """One of `MODES`, or what is done after how many random strokes."""
+    """One of `RUN_MODES`, or what is done after how many random strokes."""
 
     @property
     def name(self) -> str:
@@ -86,56 +90,49 @@ class Frames(NamedTuple):
     """The most mass that was added to light nodes, as a share of the body's own."""
 
 
-def checked_materials(names: Sequence[str]) -> list[str]:
-    """Return the materials asked for; where none is named, that of the scene and all by name.
-
-    Raises:
-        UsageError: there is no material of that name.
-    """
-    for name in names:
-        if name != AS_SHIPPED:
-            material_called(name)
-    return list(names) or [AS_SHIPPED, *MATERIALS]
-
-
-def checked_strokes(counts: Sequence[int]) -> list[int]:
-    """Return after how many strokes frames are timed, in order.
-
-    Raises:
-        UsageError: a number is negative.
-    """
-    if any(count < 0 for count in counts):
-        raise UsageError(f"--strokes is {', '.join(map(str, counts))}; a count is 0 or more")
-    return sorted(set(counts))
-
-
-def measure_real_time(
-    n_rounds: int,
-    scenes: Sequence[str],
-    materials: Sequence[str],
-    strokes: Sequence[int] = STROKE_COUNTS,
+def real_time(
+    runs: Rounds = 5,
+    watch: TurnWatch = SILENT,
     *,
-    quick: bool = False,
-    watch: Watch = SILENT,
+    scenes: Names = (),
+    materials: Names = (),
+    strokes: Annotated[Sequence[int], Parameter(consume_multiple=True)] = (),
+    quick: Annotated[bool, Parameter(negative="")] = False,
 ) -> BenchmarkResult:
-    """Do the stroke of each scene in each material, and random strokes; cases take turns.
+    """Run whole strokes in each material, with account and viewer, and after random strokes.
+
+    Takes many minutes: choose with the options. For example:
+
+    ```console
+    python -m benchmarks real-time --scenes organ --materials liver fat --runs 1
+    ```
 
     Args:
-        n_rounds: Number of rounds.
-        scenes: Names of scenes.
-        materials: Names of materials; `AS_SHIPPED` for that of the scene.
-        strokes: After how many random strokes frames are timed; they are done once.
-        quick: Whether to simulate only the begin of each scene's stroke, and to time only the
-            middle of each random one.
+        runs: Number of rounds; cases take turns.
         watch: Receives the progress.
+        scenes: organ, incision, slab, grid2, grid7 [default: all].
+        materials: Names of materials, or "as shipped" [default: that, and all].
+        strokes: After how many random strokes frames are timed [default: 0 10 26 50].
+        quick: Only the begin of each stroke, and the middle of a random one, as shipped, once.
+
+    Raises:
+        UsageError: there is no such scene or material, or a number of strokes is negative.
     """
-    pairs = list(itertools.product(scenes, materials))
-    cases = [TimedRun(*pair, mode) for pair in pairs for mode in MODES]
+    chosen = checked_scene_names(scenes)
+    of_material = list(materials) or ([AS_SHIPPED] if quick else [AS_SHIPPED, *MATERIALS])
+    for name in of_material:
+        if name != AS_SHIPPED:
+            material_called(name)
+    if any(count < 0 for count in strokes):
+        raise UsageError(f"--strokes is {', '.join(map(str, strokes))}; a count is 0 or more")
+    counts = sorted(set(strokes or ((0, 1) if quick else STROKE_COUNTS)))
+    pairs = list(itertools.product(chosen, of_material))
+    cases = [TimedRun(*pair, mode) for pair in pairs for mode in RUN_MODES] * (1 if quick else runs)
     seconds = QUICK_SECONDS if quick else None
     found: dict[TimedRun, list[Frames]] = {}
     skipped: list[Skipped] = []
-    watch.begin(n_rounds * len(cases) + len(pairs) * len(strokes))
-    for case in cases * n_rounds:
+    watch.begin(len(cases) + len(pairs) * len(counts))
+    for case in cases:
         try:
             found.setdefault(case, []).append(_stroke_frames(case, seconds))
         except (TissueError, ValueError) as error:
@@ -143,7 +140,7 @@ def measure_real_time(
         watch.tick(case.name)
     for pair in pairs:
         try:
-            for case, frames in _random_stroke_frames(*pair, strokes, seconds, watch):
+            for case, frames in _random_stroke_frames(*pair, counts, seconds, watch):
                 found.setdefault(case, []).append(frames)
         except TissueError as error:
             skipped.append(Skipped("real-time", f"{', '.join(pair)}: strokes", None, str(error)))
@@ -251,15 +248,13 @@ def _measurements(case: TimedRun, turns: Sequence[Frames]) -> list[Measurement]:
             quantity("substeps", "steps", COUNTED), [turn.substeps for turn in turns], float
         ),
     ]
-    added = [turn.added_mass for turn in turns]
     for name, unit, clock, better, values in (
         ("p99.9 of a frame", "ms", WALL.name, "lower", [_p999(turn) for turn in turns]),
         ("real-time factor", "s/s", WALL.name, HIGHER, [_factor(turn) for turn in turns]),
         ("late frames", "%", WALL.name, NEITHER, [_late(turn) for turn in turns]),
-        ("added mass", "%", COUNTED, NEITHER, [100.0 * share for share in added]),
+        ("added mass", "%", COUNTED, NEITHER, [100.0 * turn.added_mass for turn in turns]),
     ):
-        if values:
-            measured.append(summarise_values(quantity(name, unit, clock, better), values))
+        measured.append(summarise_values(quantity(name, unit, clock, better), values))
     return measured
 
 
@@ -282,10 +277,8 @@ def _print(
     found: dict[TimedRun, list[Frames]], skipped: Sequence[Skipped], console: "Console"
 ) -> None:
     """Print a line for each case."""
-    table = compact_table("real time")
-    table.add_column("case")
-    for heading in ("factor", "median ms", "p99", "p99.9", "late %", "steps", "added %"):
-        table.add_column(heading, justify="right")
+    right = ("factor", "median ms", "p99", "p99.9", "late %", "steps", "added %")
+    table = compact_table("real time", ("case",), right)
     body = None
     for case, turns in sorted(found.items(), key=lambda item: item[0][:2]):
         if body != case[:2]:
@@ -293,15 +286,13 @@ def _print(
             table.add_row(f"[bold]{case.scene}, {case.material}[/bold]")
         milliseconds = _MS_PER_S * np.concatenate([turn.seconds for turn in turns])
         steps = np.concatenate([turn.substeps for turn in turns])
-        added = turns[-1].added_mass
         table.add_row(
             f"{case.what}, {turns[0].tetrahedra:,} tets",
             three_digits(float(np.median([_factor(turn) for turn in turns]))),
             *(three_digits(float(p)) for p in np.percentile(milliseconds, (50, 99, 99.9))),
             three_digits(float(np.mean([_late(turn) for turn in turns]))),
             f"{np.median(steps):.0f}, {steps.max():.0f}",
-            "" if added is None else three_digits(100.0 * added),
+            three_digits(100.0 * turns[-1].added_mass),
         )
     console.print(table)
-    print_skipped(skipped, console)
-    console.print(_ABOUT, style="dim")
+    print_notes(_ABOUT, skipped, console)

@@ -1,30 +1,28 @@
-"""How close a step of springs comes to the limits of the machine that it runs on.
+"""The limits of this machine, bandwidth and arithmetic, and the share of them that a step uses.
 
-The limits are measured in the same rounds: bytes per second from each cache, and multiplications
-and additions per second. What a step needs of both is counted from the layout of the engine's
-arrays. The larger of the two times is the least that such a step could take; its share of the time
-that the step does take is the figure of merit.
+What a Runge-Kutta step of springs moves and computes is counted by hand, stage by stage, from
+`tissue.elasticity.spring_forces` and `tissue.integrators.nystroem` as the loops are written: a
+change of either is a change here. What a row gathers from its neighbours is not counted as bytes:
+the same pass over the nodes reads them anyway.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.blocks import jittered_block, sizes_up_to
-from benchmarks.engine import EngineLoops
-from benchmarks.limits import (
-    FLOPS_PER_CALL,
-    Triad,
-    arithmetic_case,
-    memory_level,
-    triads_by_level,
+from benchmarks.engine import (
+    VECTOR_LENGTH,
+    EngineLoops,
+    jittered_block,
+    multiply_and_add,
+    sizes_up_to,
+    triad_pass,
 )
-from benchmarks.timing import CPU, Case, time_in_turns
-from benchmarks.traffic import StepTraffic, step_traffic
+from benchmarks.timing import Case, Largest, Rounds, TurnWatch, time_in_turns
 from scalpel_sim.validate.speed.machine import CacheSizes, cache_sizes
 from scalpel_sim.validate.speed.measurements import (
+    CPU,
     HIGHER,
     BenchmarkResult,
     Measurement,
@@ -32,8 +30,8 @@ from scalpel_sim.validate.speed.measurements import (
     summarise_times,
     summarise_values,
 )
-from scalpel_sim.validate.speed.tables import print_measurements
-from scalpel_sim.validate.speed.watch import SILENT, Watch
+from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.watch import SILENT
 from tissue import FloatArray
 
 _SIZES = (6_000, 60_000, 600_000)
@@ -48,6 +46,123 @@ _ABOUT = (
     "limit is the larger of bytes over the bandwidth of the level that holds the body, and "
     "operations over the peak. Share of the limit: that time over the time taken."
 )
+
+BYTES_PER_ELEMENT = 24
+"""Bytes of an element of the triad: two doubles read, one written. The line that a store must fetch
+first is not counted, as in McCalpin's STREAM."""
+N_CHAINS = 8
+"""Vectors that `multiply_and_add` updates in turn: an operation takes 4 cycles, and two may begin
+in each cycle, so that fewer vectors would wait for their own results."""
+N_LINKS = 1000
+"""Updates of each vector in a call."""
+FLOPS_PER_CALL = 2 * VECTOR_LENGTH * N_CHAINS * N_LINKS
+"""Operations of a call: a multiplication and an addition for each number and update."""
+BEYOND_CACHES = 3.0
+"""Size of the largest triad, in sizes of the last cache: what it reads has been evicted since it
+was read before."""
+
+VECTOR_BYTES = 24
+"""Bytes of a position, velocity or force."""
+NODE_BYTES = 8 + 8 + 8 + 1
+"""Bytes of a node's row (start and length), its mass, and whether it is held."""
+ELASTIC_SLOT_BYTES = 4 + 8 + 8
+"""Bytes of a slot of a row: neighbour, stiffness, rest pull."""
+DAMPING_SLOT_BYTES = 4 + 8
+"""Bytes of a slot of a row without the rest pull."""
+
+
+class StageCost(NamedTuple):
+    """What one stage of the step moves and computes, as it passes over all rows."""
+
+    slot_bytes: int
+    """Bytes of each slot of a row."""
+    slot_flops: int
+    """Operations for each slot; a square root or a division counts as one."""
+    node_vectors: int
+    """Vectors of each node that are read or written."""
+    node_flops: int
+    """Operations for each node besides those of its row."""
+
+
+_UNDAMPED_STAGES = (
+    StageCost(ELASTIC_SLOT_BYTES, 18, 3 + 3, 34),
+    StageCost(ELASTIC_SLOT_BYTES, 18, 3 + 3 + 3, 46),
+    StageCost(ELASTIC_SLOT_BYTES, 18, 3 + 4 + 2, 64),
+)
+DAMPED_STAGES = (*_UNDAMPED_STAGES, StageCost(DAMPING_SLOT_BYTES, 25, 2 + 1 + 3, 20))
+"""Forces at three positions, and dampers once a step."""
+
+VECTORS_PER_NODE = 9
+"""Vectors of a node that a step touches: position, velocity, and seven of scratch."""
+
+
+class StepTraffic(NamedTuple):
+    """What one step must move and compute."""
+
+    n_springs: int
+    n_slots: int
+    """Slots in the rows: each spring has two, and rows are filled up to whole vectors."""
+    n_bytes: int
+    """Bytes that a step reads and writes, if nothing stayed in a cache from stage to stage."""
+    n_flops: int
+    """Operations of a step."""
+    working_set: int
+    """Bytes of all arrays that a step touches: the cache that holds them feeds it."""
+
+
+def step_traffic(row_lengths: list[int], *, is_damped: bool) -> StepTraffic:
+    """Return the traffic of a step of nodes with these numbers of springs."""
+    n_nodes = len(row_lengths)
+    n_slots = sum(-(-length // VECTOR_LENGTH) * VECTOR_LENGTH for length in row_lengths)
+    stages = DAMPED_STAGES if is_damped else _UNDAMPED_STAGES
+    return StepTraffic(
+        n_springs=sum(row_lengths) // 2,
+        n_slots=n_slots,
+        n_bytes=sum(
+            stage.slot_bytes * n_slots + (VECTOR_BYTES * stage.node_vectors + NODE_BYTES) * n_nodes
+            for stage in stages
+        ),
+        n_flops=sum(stage.slot_flops * n_slots + stage.node_flops * n_nodes for stage in stages),
+        working_set=ELASTIC_SLOT_BYTES * n_slots
+        + (VECTOR_BYTES * VECTORS_PER_NODE + NODE_BYTES) * n_nodes,
+    )
+
+
+class Triad:
+    """The loop a = b + s c over arrays that fill a number of bytes together."""
+
+    def __init__(self, n_bytes: int) -> None:
+        n = n_bytes // BYTES_PER_ELEMENT
+        self.n_bytes = n * BYTES_PER_ELEMENT
+        self._a, self._b, self._c = np.zeros(n), np.ones(n), np.ones(n)
+
+    def run(self, n: int) -> None:
+        """Run the loop `n` times."""
+        triad_pass(self._a, self._b, self._c, n)
+
+
+def triads_by_level(sizes: CacheSizes) -> dict[str, Triad]:
+    """Return a triad for each level, by its name: half of a cache, and more than the last."""
+    return {
+        "L1": Triad(sizes.l1 // 2),
+        "L2": Triad(sizes.l2 // 2),
+        "L3": Triad(sizes.l3 // 4),
+        "memory": Triad(round(BEYOND_CACHES * sizes.l3)),
+    }
+
+
+def memory_level(working_set: int, sizes: CacheSizes) -> str:
+    """Return the level that feeds a loop over this many bytes."""
+    for name, size in zip(("L1", "L2", "L3"), sizes, strict=True):
+        if working_set <= size:
+            return name
+    return "memory"
+
+
+def arithmetic_case() -> Case:
+    """Return a case that only multiplies and adds, in the engine's own vectors."""
+    values = np.zeros(N_CHAINS * VECTOR_LENGTH)
+    return Case("multiply and add", lambda n: multiply_and_add(values, n * N_LINKS))
 
 
 class RooflineBound(NamedTuple):
@@ -83,10 +198,10 @@ def roofline_bound(
     )
 
 
-def measure_roofline(
-    n_rounds: int, largest: int | None = None, watch: Watch = SILENT
+def roofline(
+    runs: Rounds = 5, watch: TurnWatch = SILENT, *, largest: Largest = None
 ) -> BenchmarkResult:
-    """Time the limits and a Runge-Kutta step of springs, in each body up to the largest."""
+    """Measure bandwidth and arithmetic of this machine, and the share of them that a step uses."""
     sizes = sizes_up_to((_SMALLEST, *_SIZES), largest)
     sizes = tuple(n for n in sizes if n != _SMALLEST) or sizes
     caches = cache_sizes()
@@ -95,7 +210,7 @@ def measure_roofline(
     cases = [Case(f"triad, {name}", triad.run) for name, triad in triads.items()]
     cases.append(arithmetic_case())
     cases += [Case(f"step, {n:,} tetrahedra", body.runge_kutta_steps) for n, body in bodies.items()]
-    taken = time_in_turns(cases, n_rounds, clock=CPU, watch=watch)
+    taken = time_in_turns(cases, runs, clock=CPU, watch=watch)
 
     n_levels = len(triads)
     of_triads = dict(zip(triads, taken[:n_levels], strict=True))
@@ -114,11 +229,10 @@ def measure_roofline(
                 FLOPS_PER_CALL / _median(of_arithmetic[r]),
                 caches,
             )
-            for r in range(n_rounds)
+            for r in range(runs)
         ]
         measured += _step_measurements(size, traffic, rounds, limits)
-    show = partial(print_measurements, "roofline", measured, [], about=_ABOUT)
-    return BenchmarkResult(measured, [], show)
+    return as_rows("roofline", measured, about=_ABOUT)
 
 
 def _bandwidths(

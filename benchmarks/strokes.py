@@ -1,34 +1,168 @@
-"""Random strokes across the organ, and whether its motion stays stable.
-
-Usage: PYTHONPATH=. python benchmarks/random_strokes.py [--strokes N] [--seed N] [--overlaps]
+"""Random strokes across a body: whether its motion stays stable, and what each frame costs.
 
 Each stroke crosses the organ at a random position, direction, lean, depth and speed, at steps of
-1 ms with default settings; loose pieces land on a floor. The table shows the body and its motion
-after each stroke. The last line says whether the run stayed stable: every number finite, no node
-much faster than the blade, and all at rest again within a second of the last stroke. With
-`--overlaps` it is then also looked how deep the faces of cuts lie in other parts of the body.
+1 ms; loose pieces land on a floor.
 """
 
-import argparse
 import itertools
-import sys
 from dataclasses import replace
-from time import thread_time
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from overlaps import report
-from rich.console import Console
-from rich.table import Table
+from scipy.spatial import cKDTree
+from trimesh.triangles import closest_point
 
-from benchmarks.random_stroke import STROKE_DT, STROKE_FLOOR, random_stroke
+from benchmarks.timing import TurnWatch
 from scalpel_sim import SCENES
-from scalpel_sim.scene_body import make_tissue
-from tissue import BladeSweep, Tissue, TissueError
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.runs.options import Flag
+from scalpel_sim.scene.scene import Scene, changed
+from scalpel_sim.validate.speed.measurements import (
+    CPU,
+    BenchmarkResult,
+    Quantity,
+    summarise_times,
+)
+from scalpel_sim.validate.speed.tables import compact_table, print_notes
+from scalpel_sim.validate.speed.watch import SILENT
+from tissue import (
+    BladeSegment,
+    BladeSweep,
+    BoolArray,
+    Energies,
+    FloatArray,
+    IntArray,
+    Tissue,
+    TissueError,
+)
+from tissue.mesh.body import CUT, OUTER
+from tissue.mesh.faces import OUTWARD
 
-FASTEST = 5.0
+if TYPE_CHECKING:
+    from rich.console import Console
+
+STROKE_DT = 1e-3
+"""Time step of the strokes [s]."""
+STROKE_FLOOR = -0.02
+"""Height of the floor on which pieces land that the strokes cut off [m]."""
+_FASTEST = 5.0
 """Speed of a node above which the motion counts as unstable [m/s]; the blade moves at 0.3."""
-AT_REST = 0.02
+_AT_REST = 0.02
 """Speed below which the body counts as at rest [m/s]."""
+_CLOSED = 0.01
+"""Largest residual of an account that closes, as a share of the work of the blade."""
+N_AFTER, N_LAST = 50, 1000
+"""Frames without a blade after each stroke, and after the last."""
+_MOST_TETRAHEDRA = 1 << 12
+"""Tetrahedra in which points are searched for at once."""
+
+_ABOUT = (
+    "Body and motion after each stroke: the most substeps of a frame, contacts that press, CPU "
+    "time of a simulated millisecond, the fastest node in m/s, and the residual of the account of "
+    "energy as a share of the work of the blade. Stable: every number finite, no node much faster "
+    "than the blade, all at rest within a second of the last stroke."
+)
+
+
+class DoneStroke(NamedTuple):
+    """The body after a stroke."""
+
+    tetrahedra: int
+    pieces: int
+    substeps: int
+    """Most substeps of a frame."""
+    contacts: int
+    """Number of contacts that press."""
+    seconds: float
+    """CPU time of a frame, mean over the stroke and the frames after it [s]."""
+    fastest: float
+    """Largest speed of a node in the stroke [m/s]."""
+    energies: Energies | None
+
+
+def random_strokes(
+    watch: TurnWatch = SILENT,
+    *,
+    strokes: int = 50,
+    seed: int = 0,
+    relaxation: Literal["global", "verlet", "hierarchical"] | None = None,
+    law: Literal["springs", "neo_hookean"] | None = None,
+    audit: Flag = False,
+    overlaps: Flag = False,
+) -> BenchmarkResult:
+    """Cut the organ by random strokes: stability, CPU time, account of energy, overlaps.
+
+    Args:
+        watch: Receives the progress.
+        strokes: Number of strokes.
+        seed: Of their random numbers.
+        relaxation: Method of integration [default: that of the scene].
+        law: Law of elasticity [default: that of the scene].
+        audit: Keep an account of the energy, which must close within 1 % of the work of the blade.
+        overlaps: Search the cuts for points that lie inside other parts of the body.
+    """
+    scene = SCENES["organ"]
+    material = scene.material
+    if law:
+        ratio = 0.45 if law == "neo_hookean" else 0.25
+        material = replace(material, law=law, poisson_ratio=ratio)
+    scene = changed(
+        scene,
+        material=material,
+        relaxation=relaxation or scene.solver.relaxation,
+        audit=audit,
+        floor=STROKE_FLOOR,
+        table=None,  # strokes come from all sides
+    )
+    tissue = make_tissue(scene)
+    random = np.random.default_rng(seed)
+    done: list[DoneStroke] = []
+    notes: list[str] = []
+    watch.begin(strokes)
+    try:
+        for i in range(strokes):
+            done.append(_stroke(tissue, random))
+            watch.tick(f"stroke {i + 1}")
+        for _ in range(N_LAST):
+            tissue.step(None, STROKE_DT)
+        is_stable = max(each.fastest for each in done) < _FASTEST and fastest(tissue) < _AT_REST
+    except TissueError as error:
+        notes.append(str(error))
+        is_stable = False
+    motion = "stable" if is_stable else "NOT STABLE"
+    notes.append(f"{motion}; fastest node at the end {fastest(tissue):.4f} m/s")
+    accounts = [(each.energies, _shares(each.energies)) for each in done if each.energies]
+    residual = max((abs(shares["residual"]) for _, shares in accounts), default=0.0)
+    for energies, shares in accounts[-1:]:
+        terms = ", ".join(f"{name} {1e2 * share:.3f} %" for name, share in shares.items())
+        closes = "the account closes" if residual <= _CLOSED else "the account DOES NOT CLOSE"
+        notes.append(f"of {1e3 * energies.work_of_blade:.1f} mJ of work of the blade: {terms}")
+        notes.append(f"{closes}: within {1e2 * residual:.3f} %")
+    if overlaps:
+        notes += overlap_report(tissue)
+    return _result(scene, done, notes, is_right=is_stable and residual <= _CLOSED)
+
+
+def random_stroke(tissue: Tissue, random: np.random.Generator) -> list[BladeSegment]:
+    """Return a stroke across the body at a random position, direction, lean, depth and speed.
+
+    One pose of the edge for each time step.
+    """
+    low, high = tissue.bounds
+    centre, extent = (low + high) / 2.0, high - low
+    yaw, lean = random.uniform(0.0, 2.0 * np.pi), random.uniform(-0.5, 0.5)
+    direction = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    side = np.array([-direction[1], direction[0], 0.0])
+    up = np.cos(lean) * np.array([0.0, 0.0, 1.0]) + np.sin(lean) * side
+    middle = centre + side * random.uniform(-0.35, 0.35) * extent[:2].min()
+    middle[2] = high[2] - random.uniform(0.1, 0.6) * extent[2]
+    half = 0.5 * float(np.linalg.norm(extent[:2])) + 0.01
+    speed = random.uniform(0.1, 0.3)
+    along = np.arange(-half, half, speed * STROKE_DT)
+    return [
+        BladeSegment(tip, tip + (extent[2] + 0.02) * up, direction)
+        for tip in (middle + s * direction for s in along)
+    ]
 
 
 def fastest(tissue: Tissue) -> float:
@@ -36,64 +170,132 @@ def fastest(tissue: Tissue) -> float:
     return float(np.linalg.norm(tissue.snapshot().velocities, axis=1).max())
 
 
-def main() -> int:
-    """Cut and print the outcome; return 1 where the run was not stable."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--strokes", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--relaxation", choices=("global", "verlet", "hierarchical"), default=None)
-    parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
-    parser.add_argument("--law", choices=("springs", "neo_hookean"), default=None)
-    parser.add_argument("--overlaps", action="store_true")
-    options = parser.parse_args()
-    scene = SCENES["organ"]
-    material = scene.material
-    if options.law:
-        ratio = 0.45 if options.law == "neo_hookean" else 0.25
-        material = replace(material, law=options.law, poisson_ratio=ratio)
-    relaxation = options.relaxation or scene.solver.relaxation
-    contact = options.contact
-    scene = changed(scene, material=material, relaxation=relaxation)
-    tissue = make_tissue(changed(scene, floor=STROKE_FLOOR, table=None))
-    random = np.random.default_rng(options.seed)
-    how = f"relaxation {relaxation}, contact {contact or 'by default'}"
-    table = Table(title=f"organ, law {material.law}, {how}")
-    names = ("stroke", "tetrahedra", "pieces", "substeps/ms", "contacts")
-    for name in (*names, "CPU ms/ms", "fastest [m/s]"):
-        table.add_column(name, justify="right")
-    console = Console()
-    is_stable, largest_speed = True, 0.0
-    try:
-        for i in range(options.strokes):
-            substeps, began, n = 0, thread_time(), 0
-            edges = random_stroke(tissue, random)
-            for before, after in itertools.pairwise(edges):
-                result = tissue.step(BladeSweep(before, after), STROKE_DT)
-                substeps, n = max(substeps, result.n_substeps), n + 1
-                if n % 20 == 0:
-                    largest_speed = max(largest_speed, fastest(tissue))
-            for _ in range(50):
-                result = tissue.step(None, STROKE_DT)
-            pressed = result.body_contacts.n_contacts
-            row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps, pressed)
-            spent = (thread_time() - began) / (n + 50) / STROKE_DT
-            table.add_row(*map(str, row), f"{spent:.2f}", f"{largest_speed:.2f}")
-            print(*row, f"{spent:.2f} {largest_speed:.2f}", file=sys.stderr)
-        for _ in range(1000):
-            tissue.step(None, STROKE_DT)
-        is_stable = largest_speed < FASTEST and fastest(tissue) < AT_REST
-    except TissueError as error:
-        console.print(f"[red]{error}[/red]")
-        is_stable = False
-    console.print(table)
-    final_speed = fastest(tissue)
-    console.print(
-        f"{'stable' if is_stable else 'NOT STABLE'}; fastest node at the end {final_speed:.4f} m/s"
+def _stroke(tissue: Tissue, random: np.random.Generator) -> DoneStroke:
+    """Make a random stroke, and the frames after it."""
+    began, substeps, speed = CPU.now(), 0, 0.0
+    sweeps: list[BladeSweep | None] = [
+        BladeSweep(*pair) for pair in itertools.pairwise(random_stroke(tissue, random))
+    ]
+    sweeps += [None] * N_AFTER
+    for i, sweep in enumerate(sweeps, start=1):
+        result = tissue.step(sweep, STROKE_DT)
+        if sweep is not None:
+            substeps = max(substeps, result.n_substeps)
+            if i % 20 == 0:
+                speed = max(speed, fastest(tissue))
+    return DoneStroke(
+        tetrahedra=tissue.n_tetrahedra,
+        pieces=tissue.n_pieces(),
+        substeps=substeps,
+        contacts=result.body_contacts.n_contacts,
+        seconds=(CPU.now() - began) / len(sweeps),
+        fastest=speed,
+        energies=result.energies,
     )
-    if options.overlaps:
-        report(tissue)
-    return 0 if is_stable else 1
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _shares(energies: Energies) -> dict[str, float]:
+    """Return the terms of an account and its residual as shares of the work of the blade."""
+    terms = {name: getattr(energies, name) for name in (*energies._fields[3:], "residual")}
+    return {name: term / energies.work_of_blade for name, term in terms.items()}
+
+
+def _result(
+    scene: Scene, done: list[DoneStroke], notes: list[str], *, is_right: bool
+) -> BenchmarkResult:
+    """Return the outcome: a row for each stroke, and the judgement."""
+    right = ("stroke", "tetrahedra", "pieces", "substeps", "contacts", "CPU ms", "fastest")
+
+    def show(console: "Console") -> None:
+        title = f"organ, law {scene.material.law}, relaxation {scene.solver.relaxation}"
+        table = compact_table(title, (), (*right, *("residual %",) * scene.solver.audit))
+        for i, each in enumerate(done, start=1):
+            row = [*map(str, (i, *each[:4])), f"{1e3 * each.seconds:.2f}", f"{each.fastest:.2f}"]
+            if each.energies is not None:
+                row.append(f"{1e2 * _shares(each.energies)['residual']:.3f}")
+            table.add_row(*row)
+        console.print(table)
+        for note in notes:
+            console.print(note, highlight=False)
+        print_notes(_ABOUT, (), console)
+
+    if not done:
+        return BenchmarkResult([], [], show, is_right)
+    frame = Quantity("random-strokes", "mean frame", done[0].tetrahedra, "time", "ms", CPU.name)
+    measured = summarise_times(frame, [np.array([s.seconds for s in done])], lambda s: 1e3 * s)
+    return BenchmarkResult([measured], [], show, is_right)
+
+
+def overlap_report(tissue: Tissue) -> list[str]:
+    """Return how many points of cuts lie in other parts of the body, a line for each kind of point.
+
+    Nodes, middles of edges and middles of faces of cuts are searched for in all tetrahedra that
+    share no node with them, whatever contacts there are. The depth of one that is inside is its
+    distance from the nearest face of the boundary that shares no node with it either.
+    """
+    body, x, size = tissue._body, tissue.snapshot().positions, tissue.node_size
+    links = body.links[: tissue.n_tetrahedra]
+    tetrahedra = body.tetrahedra[: tissue.n_tetrahedra]
+    boundary = _faces(tetrahedra, (links == CUT) | (links == OUTER))
+    cut = _faces(tetrahedra, links == CUT)
+    edges = np.unique(np.sort(cut[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    lines = []
+    for name, own in (("nodes", np.unique(cut)[:, None]), ("edges", edges), ("faces", cut)):
+        points = x[own].mean(axis=1)
+        inside = _are_inside(points, own, x, tetrahedra)
+        depths = np.array([_depth(points[i], own[i], x, boundary) for i in np.flatnonzero(inside)])
+        deep = [int((depths > share * size).sum()) for share in (0.1, 0.2)]
+        lines.append(
+            f"{name}: {len(points)} tested, {len(depths)} inside, deeper than 10 / 20 % of an "
+            f"element: {deep[0]} / {deep[1]}, deepest {1e6 * depths.max(initial=0.0):.0f} um"
+        )
+    return lines
+
+
+def _faces(tetrahedra: IntArray, wanted: BoolArray) -> IntArray:
+    """Return the nodes of the faces that are wanted of each tetrahedron, shape (n_tets, 4)."""
+    tetrahedron, face = np.nonzero(wanted)
+    nodes: IntArray = tetrahedra[tetrahedron[:, None], OUTWARD[face]]
+    return nodes
+
+
+def _are_inside(points: FloatArray, own: IntArray, x: FloatArray, tets: IntArray) -> BoolArray:
+    """Return which points are inside a tetrahedron that shares no node with them."""
+    inside = np.zeros(len(points), dtype=bool)
+    if len(points) == 0:
+        return inside
+    tree = cKDTree(points)
+    for begin in range(0, len(tets), _MOST_TETRAHEDRA):
+        part = tets[begin : begin + _MOST_TETRAHEDRA]
+        centres = x[part].mean(axis=1)
+        radii = np.linalg.norm(x[part] - centres[:, None], axis=2).max(axis=1)
+        near = tree.query_ball_point(centres, radii)
+        point = np.concatenate([np.array(found, dtype=np.int64) for found in near])
+        nodes = np.repeat(part, [len(found) for found in near], axis=0)
+        is_other = ~(own[point][:, :, None] == nodes[:, None, :]).any(axis=(1, 2))
+        corners, place = x[nodes], points[point]
+        weights = [_volumes(_with(corners, k, place)) for k in range(4)]
+        # In a tetrahedron inside out nothing can be.
+        is_in = (_volumes(corners) > 0.0) & (np.array(weights) > 0.0).all(axis=0)
+        inside[point[is_in & is_other]] = True
+    return inside
+
+
+def _with(corners: FloatArray, k: int, place: FloatArray) -> FloatArray:
+    """Return the corners of tetrahedra with corner `k` elsewhere."""
+    changed = corners.copy()
+    changed[:, k] = place
+    return changed
+
+
+def _volumes(corners: FloatArray) -> FloatArray:
+    """Return six times the signed volume of tetrahedra [m3]."""
+    volumes: FloatArray = np.linalg.det(corners[:, 1:] - corners[:, :1])
+    return volumes
+
+
+def _depth(point: FloatArray, own: IntArray, x: FloatArray, boundary: IntArray) -> float:
+    """Return the distance of a point from the nearest face that has none of its nodes [m]."""
+    others = x[boundary[~np.isin(boundary, own).any(axis=1)]]
+    nearest = closest_point(others, np.broadcast_to(point, (len(others), 3)))
+    return float(np.linalg.norm(nearest - point, axis=1).min())

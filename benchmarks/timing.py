@@ -1,38 +1,31 @@
-"""Timing: cases take turns in rounds, so that a disturbance of the machine affects all alike."""
+"""The timer: cases take turns in rounds, so that a disturbance of the machine affects all alike."""
 
-import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from cyclopts import Parameter
 
 from scalpel_sim.simulation import no_garbage_collection
+from scalpel_sim.validate.speed.measurements import CPU, WALL, Clock
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from tissue import FloatArray
 
+Rounds = Annotated[int, Parameter(parse=False)]
+"""Number of rounds: `--runs`, which all benchmarks have."""
+TurnWatch = Annotated[Watch, Parameter(parse=False)]
+"""Receives the progress."""
+Largest = Annotated[int | None, Parameter(help="Omit larger bodies [tetrahedra].")]
+"""`--largest`, of benchmarks in bodies of several sizes."""
+
 _TURN = 0.1
-"""How long a case runs in each round [s]: long beside a time slice of the operating system, short
-beside the changes of load on a shared machine."""
+"""How long a case runs in each round [s]: long compared with a time slice of the operating system,
+short compared with the changes of load on a shared machine."""
 LEAST_SAMPLES = 3
 """Fewest samples of a case in a round, where one sample takes longer than its turn."""
 SHORTEST_SAMPLE = 2e-4
 """Least duration of a sample [s]: as many calls as this needs are timed together. Reading the
 clock takes 0.5 µs of it; in shorter samples that would show."""
-
-
-class Clock(NamedTuple):
-    """A clock that a case is timed with."""
-
-    name: str
-    now: Callable[[], float]
-    """Returns the time since some fixed moment [s]."""
-
-
-CPU = Clock("CPU", time.thread_time)
-"""CPU time of this thread: other work on the machine does not count, except that it takes its share
-of caches and memory. For kernels, which do nothing but compute."""
-WALL = Clock("wall", time.perf_counter)
-"""Wall time, what a person waits for. For frames, whose deadline is in wall time."""
 
 
 class Case(NamedTuple):
@@ -58,9 +51,9 @@ def time_in_turns(
     the same one.
 
     Args:
-        cases: What to time.
+        cases: Cases to time.
         n_rounds: Rounds; every case has one turn in each.
-        clock: What to time with.
+        clock: Clock of the samples.
         turn: Least duration of a turn [s].
         watch: Receives the progress.
 
@@ -107,11 +100,11 @@ def time_turn(run: Callable[[int], None], n_calls: int, clock: Clock, turn: floa
             return np.array(samples)
 
 
-def median_milliseconds(do: Callable[[], object], n_times: int) -> float:
-    """Return how long a call takes, the median of several [ms]: for one whose state stays."""
-    times = []
-    for _ in range(n_times):
-        start = time.perf_counter()
+def time_calls(do: Callable[[], object], n_times: int, clock: Clock = WALL) -> FloatArray:
+    """Return the time of each of some calls [s], shape (n_times,)."""
+    taken = np.empty(n_times)
+    for i in range(n_times):
+        start = clock.now()
         do()
-        times.append(time.perf_counter() - start)
-    return 1e3 * float(np.median(times))
+        taken[i] = clock.now() - start
+    return taken

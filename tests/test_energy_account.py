@@ -1,8 +1,8 @@
 """The account of the energy over several strokes into one body: nothing is made or lost at a split.
 
 The residual is what no term explains. Terms that are found as a difference are bounded here in
-sign and size, since what is wrong with them would not show in it. `benchmarks/energy_account.py`
-makes a hundred strokes into an organ.
+sign and size, since what is wrong with them would not show in it. `python -m benchmarks
+random-strokes --audit --strokes 100` makes a hundred strokes into an organ.
 """
 
 import itertools
@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from benchmarks.random_stroke import STROKE_DT, random_stroke
+from benchmarks.strokes import STROKE_DT, random_stroke
 from tests.bodies import sides
 from tissue import (
     BladeSegment,

@@ -331,9 +331,6 @@ def test_20_mass_volume_and_momentum_are_unchanged_after_a_hundred_cuts():
     assert verdict.growth > 5.0
 
 
-# benchmarks/random_incisions.py runs a thousand of these.
-
-
 def cuts_of(mesh: TetrahedralMesh, kind: str, seed: int) -> list[Incision]:
     """Return one incision of a kind, or for "crossing" two of any kind that may cross."""
     if kind != "crossing":

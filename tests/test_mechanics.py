@@ -1,8 +1,8 @@
 """The body against the theory of elasticity: acceptance tests 22 to 27, and more.
 
 Small strains are compared with `tissue.elasticity.stiffness_matrix`. The matrix is compared here
-with the engine's own forces, so its results for fine bars (benchmarks/mesh_study.py) hold for the
-engine too.
+with the engine's own forces, so its results for fine bars (`python -m benchmarks mesh-study`) hold
+for the engine too.
 """
 
 from dataclasses import replace

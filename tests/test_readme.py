@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from cyclopts import App
 
+from benchmarks.__main__ import BENCHMARKS, benchmark_line
 from scalpel_sim.cli.app import app, command_line
 from scalpel_sim.runs.file_names import RUN_FILES
 
@@ -157,6 +158,9 @@ def test_the_options_that_a_page_names_are_those_of_the_program(capsys):
     known = ""
     for command in HELPS:
         assert command_line([*command.split(), "--help"]) == 0
+        known += capsys.readouterr().out
+    for name in BENCHMARKS:
+        assert benchmark_line([name, "--help"]) == 0
         known += capsys.readouterr().out
     assert named and {option for option in named if option not in known} == set()
 

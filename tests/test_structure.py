@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("tissue", "bridge", "scalpel_sim")
+PACKAGES = ("tissue", "bridge", "scalpel_sim", "benchmarks")
 SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 MOST_LINES = 400

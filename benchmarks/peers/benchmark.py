@@ -1,6 +1,7 @@
 """Other engines in the same rounds as this one: one process each, on one core, with one thread.
 
-`peer_cases` lists what runs, `peer_process` runs it.
+Like is compared with like: springs with springs, and tetrahedra under a hyperelastic law with the
+same number of force evaluations.
 """
 
 import sys
@@ -9,36 +10,22 @@ from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
+from cyclopts import Parameter
 
-from benchmarks.blocks import held_nodes, jittered_block, measured_edges, sizes_up_to
-from benchmarks.engine import (
-    DENSITY,
-    FRAME_DT,
-    POISSON_RATIO,
-    YOUNG_MODULUS,
-    block_material,
-)
-from benchmarks.peers.cases import (
-    LIKE_FOR_LIKE,
-    OURS,
-    OURS_SOLID,
-    OURS_SPRINGS,
-    PEERS,
-    UNDAMPED,
-    EngineCase,
-)
+from benchmarks.engine import jittered_block, sizes_up_to
 from benchmarks.peers.process import (
     NotInstalledError,
     PeerError,
     PeerProcess,
     PeerTurn,
+    body_file,
     last_core,
     start_peer,
 )
-from scalpel_sim.bench.peers.protocol import PeerBody, write_body
+from benchmarks.timing import Largest, Rounds, TurnWatch
 from scalpel_sim.errors import UsageError
 from scalpel_sim.validate.speed.measurements import (
     HIGHER,
@@ -49,9 +36,8 @@ from scalpel_sim.validate.speed.measurements import (
     summarise_times,
     summarise_values,
 )
-from scalpel_sim.validate.speed.tables import compact_table, print_skipped, three_digits
+from scalpel_sim.validate.speed.tables import compact_table, print_notes, three_digits
 from scalpel_sim.validate.speed.watch import SILENT, Watch
-from tissue import TetrahedralMesh
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -65,6 +51,138 @@ _MS_PER_S = 1e3
 _CLOCK = "CPU of the process"
 
 
+class EngineCase(NamedTuple):
+    """A case of this engine or of another."""
+
+    engine: str
+    adapter: str
+    """Name of the adapter."""
+    case: str
+    """The case, as the adapter names it."""
+    law: str
+    """Law of elasticity, damping, and method."""
+    evaluations: str
+    """Force evaluations in a step; `-` where the method solves a system instead."""
+    differs: str
+    """Precision, and other differences."""
+    install: str = ""
+    """Command that installs the engine."""
+
+
+OURS_SPRINGS, OURS_SOLID = "springs, Runge-Kutta", "plain neo-Hookean, 1 evaluation"
+"""Names of the cases that others are compared with: damped with damped, undamped with undamped."""
+UNDAMPED = ", undamped"
+"""End of the name of a case without dampers."""
+SINGLE = ", single"
+"""End of the name of a case whose forces are computed in single precision."""
+
+_RKN, _EULER = "Runge-Kutta-Nystroem", "symplectic Euler"
+_AVERAGED = "f64; averaged dilatation"
+
+OURS: dict[str, EngineCase] = {
+    OURS_SPRINGS: EngineCase(
+        "ours", "ours", "springs:runge_kutta:damped", f"springs, damped; {_RKN}", "3",
+        "f64; dampers once a step",
+    ),
+    OURS_SPRINGS + UNDAMPED: EngineCase(
+        "ours", "ours", "springs:runge_kutta:undamped", f"springs, no damping; {_RKN}", "3",
+        "f64",
+    ),
+    "springs, 1 evaluation": EngineCase(
+        "ours", "ours", "springs:euler:damped", f"springs, damped; {_EULER}", "1",
+        "f64; for comparison only",
+    ),
+    OURS_SOLID: EngineCase(
+        "ours", "ours", "neo_hookean:euler:damped:plain", f"neo-Hookean, damped; {_EULER}", "1",
+        "f64; for comparison only",
+    ),
+    OURS_SOLID + UNDAMPED: EngineCase(
+        "ours", "ours", "neo_hookean:euler:undamped:plain",
+        f"neo-Hookean, no damping; {_EULER}", "1", "f64; for comparison only",
+    ),
+    "neo-Hookean, 1 evaluation": EngineCase(
+        "ours", "ours", "neo_hookean:euler:damped", f"neo-Hookean, damped; {_EULER}", "1",
+        f"{_AVERAGED}; for comparison only",
+    ),
+    "neo-Hookean, Runge-Kutta": EngineCase(
+        "ours", "ours", "neo_hookean:runge_kutta:damped", f"neo-Hookean, damped; {_RKN}", "3",
+        f"{_AVERAGED}; dampers once a step",
+    ),
+    OURS_SOLID + SINGLE: EngineCase(
+        "ours", "ours", "neo_hookean:euler:damped:plain:single",
+        f"neo-Hookean, damped; {_EULER}", "1", "f32, state in f64; for comparison only",
+    ),
+    OURS_SOLID + SINGLE + UNDAMPED: EngineCase(
+        "ours", "ours", "neo_hookean:euler:undamped:plain:single",
+        f"neo-Hookean, no damping; {_EULER}", "1", "f32, state in f64; for comparison only",
+    ),
+    "neo-Hookean, Runge-Kutta" + SINGLE: EngineCase(
+        "ours", "ours", "neo_hookean:runge_kutta:damped:single",
+        f"neo-Hookean, damped; {_RKN}", "3",
+        "f32, state in f64; averaged dilatation; dampers once a step",
+    ),
+}  # fmt: skip
+
+_MUJOCO, _NEWTON, _RAPIER = (f"pip install {name}" for name in ("mujoco", "newton", "rapier3d"))
+_KIRCHHOFF = "St. Venant-Kirchhoff"
+
+PEERS: dict[str, EngineCase] = {
+    "MuJoCo flex, Euler": EngineCase(
+        "MuJoCo", "mujoco_flex", "Euler:damped", f"{_KIRCHHOFF}, damped; Euler", "1",
+        "f64; the whole of mj_step, contact off", _MUJOCO,
+    ),
+    "MuJoCo flex, Euler" + UNDAMPED: EngineCase(
+        "MuJoCo", "mujoco_flex", "Euler:undamped", f"{_KIRCHHOFF}, no damping; Euler", "1",
+        "f64; the whole of mj_step, contact off", _MUJOCO,
+    ),
+    "MuJoCo flex, RK4": EngineCase(
+        "MuJoCo", "mujoco_flex", "RK4:damped", f"{_KIRCHHOFF}, damped; Runge-Kutta 4", "4",
+        "f64; the whole of mj_step, contact off", _MUJOCO,
+    ),
+    "MuJoCo flex, discrete": EngineCase(
+        "MuJoCo", "mujoco_flex", "discrete:damped", f"{_KIRCHHOFF}, damped; implicit", "-",
+        "f64; could take longer steps; contact off", _MUJOCO,
+    ),
+    "Newton springs": EngineCase(
+        "Newton", "newton_semi_implicit", "springs:damped", f"springs, damped; {_EULER}", "1",
+        "f32; contact and particle grid off", _NEWTON,
+    ),
+    "Newton springs" + UNDAMPED: EngineCase(
+        "Newton", "newton_semi_implicit", "springs:undamped", f"springs, no damping; {_EULER}",
+        "1", "f32; contact and particle grid off", _NEWTON,
+    ),
+    "Newton neo-Hookean": EngineCase(
+        "Newton", "newton_semi_implicit", "neo_hookean:damped",
+        f"neo-Hookean, damped; {_EULER}", "1", "f32; contact and particle grid off", _NEWTON,
+    ),
+    "Rapier springs": EngineCase(
+        "Rapier", "rapier_soft", "springs", "distance constraints; 1 iteration", "-",
+        "f32; its softness; 1 iteration: its default is 4; collision off", _RAPIER,
+    ),
+    "Rapier constraints": EngineCase(
+        "Rapier", "rapier_soft", "constraints", "neo-Hookean; 1 iteration", "-",
+        "f32; could take longer steps; 1 iteration: its default is 4; collision off", _RAPIER,
+    ),
+    "Rapier finite elements": EngineCase(
+        "Rapier", "rapier_soft", "fem", "neo-Hookean; conjugate gradient", "-",
+        "f32; could take longer steps; 1 substep: its default is 4; collision off", _RAPIER,
+    ),
+}  # fmt: skip
+
+LIKE_FOR_LIKE = ("MuJoCo flex, Euler", "Newton neo-Hookean")
+"""Cases with one evaluation of a hyperelastic law on tetrahedra, as `OURS_SOLID`."""
+
+
+_ABOUT = (
+    "CPU time of the process on one core with one thread, median over all samples. Forces: force "
+    f"evaluations in a step. x springs: how many times as long as our '{OURS_SPRINGS}'; x solid: "
+    f"as our '{OURS_SOLID}', which is like for like with {' and '.join(map(repr, LIKE_FOR_LIKE))}. "
+    "Both are medians of the ratios of each round, damped cases to ours damped, others to ours "
+    "undamped. Implicit methods could take longer steps than 1 ms; accuracy for the same cost is "
+    "not compared here."
+)
+
+
 class PeerRun(NamedTuple):
     """A case in one body: its turns, in the order of the rounds."""
 
@@ -75,20 +193,21 @@ class PeerRun(NamedTuple):
     turns: list[PeerTurn]
 
 
-def measure_peers(
-    n_rounds: int,
-    largest: int | None = None,
+def peers(
+    runs: Rounds = 5,
+    watch: TurnWatch = SILENT,
+    *,
+    largest: Largest = None,
     python: Path | None = None,
-    watch: Watch = SILENT,
-    sizes: Sequence[int] = _SIZES,
+    sizes: Annotated[Sequence[int], Parameter(parse=False)] = _SIZES,
 ) -> BenchmarkResult:
-    """Run all cases in turns, in each body up to the largest.
+    """Time MuJoCo flex, Newton and Rapier in turns with this engine, where they are installed.
 
     Args:
-        n_rounds: Rounds; every case has a turn in each.
-        largest: Largest body [tetrahedra]; None: all sizes.
-        python: The Python of an environment with engines that this one lacks.
+        runs: Rounds; every case has a turn in each.
         watch: Receives the progress.
+        largest: Omit larger bodies [tetrahedra].
+        python: The Python of an environment that has the engines that this one lacks.
         sizes: Sizes of the bodies [tetrahedra].
 
     Raises:
@@ -96,18 +215,18 @@ def measure_peers(
     """
     wanted = sizes_up_to(tuple(sizes), largest)
     pythons = _pythons(python)
-    runs: list[PeerRun] = []
+    done: list[PeerRun] = []
     skipped: list[Skipped] = []
-    watch.begin(len(wanted) * n_rounds * len(OURS | PEERS))
+    watch.begin(len(wanted) * runs * len(OURS | PEERS))
     for size in wanted:
-        runs_of_size, skipped_of_size = _run_in_one_body(size, n_rounds, pythons, watch)
-        runs += runs_of_size
+        done_of_size, skipped_of_size = _run_in_one_body(size, runs, pythons, watch)
+        done += done_of_size
         skipped += skipped_of_size
-    measured = [measurement for each in runs for measurement in _measurements(each, runs)]
-    return BenchmarkResult(measured, skipped, partial(print_peers, runs, measured, skipped))
+    measured = [measurement for each in done for measurement in _measurements(each, done)]
+    return BenchmarkResult(measured, skipped, partial(_print, done, measured, skipped))
 
 
-def print_peers(
+def _print(
     runs: Sequence[PeerRun],
     measured: Sequence[Measurement],
     skipped: Sequence[Skipped],
@@ -116,11 +235,9 @@ def print_peers(
     """Print a table for each size: time of a step, ratios to ours, and what differs."""
     times = {(m.case, m.tetrahedra, m.quantity): m for m in measured}
     for size in sorted({each.tetrahedra for each in runs}):
-        table = compact_table(f"{size:,} tetrahedra: CPU time in ms for a step of 1 ms")
-        table.add_column("engine")
-        table.add_column("what differs")
-        for heading in ("forces", "ms", "p95", "p99", "x springs", "x solid"):
-            table.add_column(heading, justify="right")
+        title = f"{size:,} tetrahedra: CPU time in ms for a step of 1 ms"
+        right = ("forces", "ms", "p95", "p99", "x springs", "x solid")
+        table = compact_table(title, ("engine", "what differs"), right)
         for each in (one for one in runs if one.tetrahedra == size):
             step = times[each.name, size, "time"]
             ratios = (times.get((each.name, size, ratio_to(o))) for o in (OURS_SPRINGS, OURS_SOLID))
@@ -132,42 +249,13 @@ def print_peers(
                 *("" if ratio is None else three_digits(ratio.median) for ratio in ratios),
             )
         console.print(table)
-    print_skipped(skipped, console)
     versions = ", ".join(sorted({f"{one.case.engine} {one.version}" for one in runs}))
-    console.print(
-        f"{versions}. CPU time of the process on one core with one thread, median over all "
-        "samples. Forces: force evaluations in a step. x springs: how many times as long as our "
-        f"'{OURS_SPRINGS}'; x solid: as our '{OURS_SOLID}', which is like for like with "
-        f"{' and '.join(map(repr, LIKE_FOR_LIKE))}. Both are medians of the ratios of each "
-        "round, damped cases to ours damped, others to ours undamped. Implicit methods could take "
-        "longer steps than 1 ms; accuracy for the same cost is not compared here.",
-        style="dim",
-    )
+    print_notes(f"{versions}. {_ABOUT}", skipped, console)
 
 
 def ratio_to(name: str) -> str:
     """Return the name of the quantity: how many times as long as ours a case takes."""
     return f"times as long as {name}"
-
-
-def body_file(folder: Path, mesh: TetrahedralMesh) -> Path:
-    """Write a block for the other processes; return the file."""
-    edges = measured_edges(mesh)
-    file = folder / "body.npz"
-    body = PeerBody(
-        positions=mesh.positions,
-        tetrahedra=mesh.tetrahedra.astype(np.int32),
-        edges=edges.nodes,
-        stiffness=YOUNG_MODULUS * edges.volumes / edges.lengths**2,
-        masses=DENSITY * edges.node_volumes,
-        held=np.flatnonzero(held_nodes(mesh)),
-        young_modulus=YOUNG_MODULUS,
-        poisson_ratio=POISSON_RATIO["neo_hookean"],
-        retardation_time=block_material("springs").retardation_time,
-        dt=FRAME_DT,
-    )
-    write_body(str(file), body)
-    return file
 
 
 def _pythons(python: Path | None) -> list[Path]:

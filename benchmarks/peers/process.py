@@ -1,6 +1,6 @@
-"""One case of one engine in a process of its own, which steps on request.
+"""One case of one engine in a process of its own, which steps on request; the body that it gets.
 
-`scalpel_sim.bench.peers.protocol` is the other side.
+`benchmarks.peers.adapters` is the other side.
 """
 
 import json
@@ -14,11 +14,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.engine import (
+    FRAME_DT,
+    POISSON_RATIO,
+    YOUNG_MODULUS,
+    EngineLoops,
+    block_material,
+    held_nodes,
+)
+from benchmarks.peers.adapters import PeerBody, write_body
 from scalpel_sim.recording.row_store import unnamed_file
-from tissue import FloatArray
+from tissue import FloatArray, TetrahedralMesh
 
-_ADAPTERS = Path(__file__).parent / "peers"
-"""Folder of the adapters. It is run by path, since the other Python need not have this package."""
+_ADAPTERS = Path(__file__).with_name("adapters.py")
+"""File of the adapters. It is run by path, since the other Python need not have this package."""
 
 LONGEST_START = 300.0
 """Longest time for an engine to import, compile and build its body [s]; Warp compiles for a
@@ -55,7 +64,7 @@ class PeerProcess:
     """A case that is built and ready to step.
 
     Args:
-        adapter: Name of the adapter's module in `peers`.
+        adapter: Name of the adapter.
         case: The case, as the adapter names it.
         body: File with the arrays of `PeerBody`.
         python: The Python that has the engine.
@@ -69,7 +78,7 @@ class PeerProcess:
     def __init__(self, adapter: str, case: str, body: Path, python: Path, core: int) -> None:
         self._errors = unnamed_file()
         self._process = subprocess.Popen(
-            [python, _ADAPTERS / "__main__.py", adapter, body, case, str(core)],
+            [python, _ADAPTERS, adapter, body, case, str(core)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -141,7 +150,7 @@ def start_peer(
     """Start a case in the first of these Pythons that has its engine.
 
     Args:
-        adapter: Name of the adapter's module in `peers`.
+        adapter: Name of the adapter.
         case: The case, as the adapter names it.
         body: File with the arrays of `PeerBody`.
         pythons: Where to look for the engine, in this order.
@@ -172,3 +181,24 @@ def _environment(python: Path) -> dict[str, str]:
     if python == Path(sys.executable):
         environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     return environment
+
+
+def body_file(folder: Path, mesh: TetrahedralMesh) -> Path:
+    """Write a block for the other processes, with our springs and masses; return the file."""
+    ours = EngineLoops(mesh)
+    edges, stiffness = ours.springs
+    file = folder / "body.npz"
+    body = PeerBody(
+        positions=mesh.positions,
+        tetrahedra=mesh.tetrahedra.astype(np.int32),
+        edges=edges,
+        stiffness=stiffness,
+        masses=ours.masses,
+        held=np.flatnonzero(held_nodes(mesh)),
+        young_modulus=YOUNG_MODULUS,
+        poisson_ratio=POISSON_RATIO["neo_hookean"],
+        retardation_time=block_material("springs").retardation_time,
+        dt=FRAME_DT,
+    )
+    write_body(str(file), body)
+    return file

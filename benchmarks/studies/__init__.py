@@ -1,1 +1,1 @@
-"""Studies of accuracy and of random cases: each prints what it found, and fails where it is wrong."""
+"""Studies of accuracy and of random cases: each prints its findings, and fails on a fault."""

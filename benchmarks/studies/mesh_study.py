@@ -1,25 +1,25 @@
 """Mesh study: sag and frequencies of a bar against theory, for each law and for finer meshes.
 
-Usage: PYTHONPATH=. python benchmarks/mesh_study.py [--finest N] [--out FOLDER]
-
-It writes `mesh_study.md` and `mesh_study.png`. A square bar, 8 times as long as thick, of n cells
+A square bar, 8 times as long as thick, of n cells
 through its thickness (Kuhn's six tetrahedra each, or the twelve of a lattice), is clamped at one
 end and sags under its own weight. All strains are small, and everything follows from the stiffness
 matrix of `tissue.elasticity.stiffness_matrix`, which `tests/test_mechanics.py` compares with the
 forces that the engine computes.
 """
 
-import argparse
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh, splu
 
+from benchmarks.timing import TurnWatch
+from scalpel_sim.validate.speed.measurements import BenchmarkResult
+from scalpel_sim.validate.speed.watch import SILENT
 from tissue import FloatArray, Material, TetrahedralMesh, block, lattice_block
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 
@@ -44,6 +44,34 @@ MODES = ("bending 1", "bending 2", "torsion 1", "stretching 1")
 
 TORSION_CONSTANT = 0.140577
 """Torsion constant of a square section over a^4, by Saint-Venant's series."""
+
+
+def mesh_study(
+    watch: TurnWatch = SILENT,
+    *,
+    finest: Literal[2, 4, 6, 8] = 8,
+    out: Path = Path("docs"),
+) -> BenchmarkResult:
+    """Compare a clamped bar with theory, for each law and finer meshes: mesh_study.md and .png.
+
+    Args:
+        watch: Receives the progress.
+        finest: Most cells through the thickness of the bar.
+        out: Folder of the page and the picture.
+    """
+    counts = [n for n in (1, 2, 4, 6, 8) if n <= finest]
+    studied = models()
+    watch.begin(len(studied))
+    studies = []
+    for model in studied:
+        studies.append(study(model, counts))
+        watch.tick(model.name)
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "mesh_study.md").write_text(as_markdown(studies), encoding="utf-8")
+    draw(studies, out / "mesh_study.png")
+    lines = [f"{rows[0].model}: sag {[f'{row.sag:.3f}' for row in rows]}" for rows in studies]
+    lines.append(f"written: {out / 'mesh_study.md'}, {out / 'mesh_study.png'}")
+    return BenchmarkResult([], [], lambda console: console.print("\n".join(lines)))
 
 
 class Model(NamedTuple):
@@ -242,7 +270,7 @@ def study(model: Model, counts: Sequence[int]) -> list[Row]:
     return rows
 
 
-def extrapolated(coarse: float, fine: float, ratio: float) -> float:
+def limit_of_meshes(coarse: float, fine: float, ratio: float) -> float:
     """Return the limit of a quantity whose error falls with the square of the element size."""
     return fine + (fine - coarse) / (ratio**2 - 1.0)
 
@@ -257,7 +285,7 @@ def as_markdown(studies: Sequence[Sequence[Row]]) -> str:
         coarse, fine = rows[-2:]
         pairs = [(coarse.sag, fine.sag)]
         pairs += [(coarse.frequencies[mode], fine.frequencies[mode]) for mode in MODES]
-        limits = [extrapolated(a, b, fine.n / coarse.n) for a, b in pairs]
+        limits = [limit_of_meshes(a, b, fine.n / coarse.n) for a, b in pairs]
         text_rows.append(_text_row(rows[0].model, "limit", "", limits))
     return TEXT.format(rows="\n".join(text_rows), modes=" | ".join(MODES))
 
@@ -295,7 +323,7 @@ error that falls as the square of their size.
   Poisson's ratio of 0, where nothing narrows, is nearest to 1, and the others are about 1 to 3 %
   stiffer, as they should be.
 
-Made by `python benchmarks/mesh_study.py`.
+Made by `python -m benchmarks mesh-study`.
 """
 
 
@@ -336,23 +364,3 @@ def draw(studies: Sequence[Sequence[Row]], path: Path) -> None:
     axes[1].legend(fontsize=8)
     figure.savefig(path, dpi=110)
     plt.close(figure)
-
-
-def main() -> None:
-    """Run the study; write its page and its picture."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--finest", type=int, default=8, choices=(2, 4, 6, 8))
-    parser.add_argument("--out", type=Path, default=Path("docs"))
-    arguments = parser.parse_args()
-    counts = [n for n in (1, 2, 4, 6, 8) if n <= arguments.finest]
-    studies = []
-    for model in models():
-        studies.append(study(model, counts))
-        print(model.name, [f"{row.sag:.3f}" for row in studies[-1]], flush=True)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "mesh_study.md").write_text(as_markdown(studies), encoding="utf-8")
-    draw(studies, arguments.out / "mesh_study.png")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,36 +1,90 @@
 """Whether the scenes of two hands end as they should wherever the hands start.
 
-Usage: PYTHONPATH=. python benchmarks/two_hands.py SCENE [--runs N] [--seed N] [--set KEY=VALUE]
-
-SCENE is retract, excise or taut_incision. In each run each hand does what it does at a place of its
-own, moved as a whole by up to 3 mm in a random direction. A row shows how it ended, what is not as
-it should be, and by how much the account of the energy is off, as a share of the work of all hands.
-The last line counts.
+In each run each hand does what it does at a place of its own, moved as a whole by up to 3 mm in a
+random direction.
 """
 
-import argparse
-import sys
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from rich.console import Console
+from cyclopts import Parameter
 
+from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim import Simulation, prepare
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.strokes.asked_area import asked_area
-from tests.scalpel_sim.moved_scenes import moved
+from scalpel_sim.validate.speed.measurements import BenchmarkResult
+from scalpel_sim.validate.speed.watch import SILENT
 from tissue import Piece, pieces_of
 
-CLOSED = 0.005
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_CLOSED = 0.005
 """Largest residual of an account that closes, as a share of the work of all hands."""
 
-LEAST_OPENED = 0.9
+_LEAST_OPENED = 0.9
 """Share of the area that an incision is asked to cut which it opens at least."""
 
-REST = 0.3
-"""How long a scene goes on after all hands are done [s]."""
+_REST = 0.3
+"""How long a scene continues after all hands are done [s]."""
 
-SCENES = ("retract", "excise", "taut_incision")
-"""The scenes."""
+
+Settings = Annotated[tuple[str, ...], Parameter(name="--set", negative="")]
+
+
+def two_hands(
+    scene: Literal["retract", "excise", "taut_incision"],
+    /,
+    runs: Rounds = 20,
+    watch: TurnWatch = SILENT,
+    *,
+    seed: int = 0,
+    settings: Settings = (),
+) -> BenchmarkResult:
+    """Start the hands of a scene at random places: count how many runs end as they should.
+
+    A line for each run shows how it ended, what is not as it should be, and by how much the account
+    of the energy is off, as a share of the work of all hands.
+
+    Args:
+        scene: retract, excise or taut_incision.
+        runs: Number of runs.
+        watch: Receives the progress.
+        seed: Of the random numbers.
+        settings: A key of the scene file, such as material.toughness=50.
+    """
+    from tests.scalpel_sim.moved_scenes import moved
+
+    chosen = scene_in(with_settings(shipped_scene(scene), ["solver.audit=true", *settings]))
+    random = np.random.default_rng(seed)
+    lines: list[str] = []
+    n_right = n_closed = 0
+    watch.begin(runs)
+    for i in range(1, runs + 1):
+        simulation = prepare(moved(chosen, random))
+        asked = asked_area(simulation.stroke, simulation.link.snapshot()) or 0.0
+        simulation.run(simulation.duration + _REST)
+        energies = simulation.result.energies
+        assert energies is not None
+        work = energies.work_of_blade + abs(energies.work_of_loads)
+        off = energies.residual / work
+        wrong = what_is_wrong(scene, simulation, asked)
+        n_right += not wrong
+        n_closed += abs(off) <= _CLOSED
+        mark = f"NOT as it should ({'; '.join(wrong)})" if wrong else "as it should"
+        lines.append(
+            f"{i:3}  ends {mark}, pieces {simulation.link.n_pieces()}, residual {1e2 * off:.2f} % "
+            f"of {1e3 * work:.3g} mJ, touched {dict(simulation.touching.frames)}"
+        )
+        watch.tick(f"run {i}")
+    lines.append(f"{n_right} of {runs} end as they should, {n_closed} accounts close")
+
+    def show(console: "Console") -> None:
+        for line in lines:
+            console.print(line, highlight=False)
+
+    return BenchmarkResult([], [], show, is_right=n_right == n_closed == runs)
 
 
 def what_is_wrong(name: str, simulation: Simulation, asked: float) -> list[str]:
@@ -63,7 +117,7 @@ def _wrong_of_incision(
     cut = f"{1e6 * opened[-1]:.0f} of {1e6 * asked:.0f} mm2 are cut"
     return {
         f"{len(are_held)} pieces, {sum(are_held)} of them held, not one": are_held != [True],
-        cut: not opened[-1] > LEAST_OPENED * asked,
+        cut: not opened[-1] > _LEAST_OPENED * asked,
         f"slack during the cut: the hand feels {least:.2f} N": least <= 0.0,
     }
 
@@ -82,39 +136,3 @@ def _wrong_of_piece(name: str, off: Piece, n_points: int) -> dict[str, bool]:
         moves: speed >= 0.01,
         f"the left hand still holds {n_points} points": n_points > 0,
     }
-
-
-def main() -> int:
-    """Do the runs and print how they ended; return 1 where one did not end right."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scene", choices=SCENES)
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--set", action="append", default=["solver.audit=true"])
-    options = parser.parse_args()
-    console = Console()
-    scene = scene_in(with_settings(shipped_scene(options.scene), options.set))
-    random = np.random.default_rng(options.seed)
-    n_right = n_closed = 0
-    for i in range(1, options.runs + 1):
-        simulation = prepare(moved(scene, random))
-        asked = asked_area(simulation.stroke, simulation.link.snapshot()) or 0.0
-        simulation.run(simulation.duration + REST)
-        energies = simulation.result.energies
-        assert energies is not None
-        work = energies.work_of_blade + abs(energies.work_of_loads)
-        off = energies.residual / work
-        wrong = what_is_wrong(options.scene, simulation, asked)
-        n_right += not wrong
-        n_closed += abs(off) <= CLOSED
-        mark = f"NOT as it should ({'; '.join(wrong)})" if wrong else "as it should"
-        console.print(
-            f"{i:3}  ends {mark}, pieces {simulation.link.n_pieces()}, residual {1e2 * off:.2f} % "
-            f"of {1e3 * work:.3g} mJ, touched {dict(simulation.touching.frames)}"
-        )
-    console.print(f"{n_right} of {options.runs} end as they should, {n_closed} accounts close")
-    return 0 if n_right == n_closed == options.runs else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

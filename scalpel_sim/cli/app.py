@@ -8,13 +8,6 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
-from scalpel_sim.cli.console import (
-    expect_no_warnings,
-    log_to_stderr,
-    print_report,
-    say,
-    say_error,
-)
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
 from scalpel_sim.cli.spacemouse_command import spacemouse
@@ -31,8 +24,24 @@ from scalpel_sim.errors import (
 )
 from scalpel_sim.figures.command import figure
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.stop_signals import raised_signal
-from scalpel_sim.validate.command import validate
+from scalpel_sim.runs.console import (
+    expect_no_warnings,
+    log_to_stderr,
+    print_report,
+    say,
+    say_error,
+)
+from scalpel_sim.runs.options import (
+    CONNECTION,
+    DEVICE,
+    OUTPUT,
+    ClientOptions,
+    DeviceOptions,
+    Flag,
+    PrintOptions,
+    RunOutputOptions,
+)
+from scalpel_sim.runs.stop_signals import raised_signal
 from scalpel_sim.validate.speed.command import bench
 from scalpel_sim.version import version
 

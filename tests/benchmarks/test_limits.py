@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from benchmarks.limits import (
+from benchmarks.roofline import (
     FLOPS_PER_CALL,
+    StepTraffic,
     Triad,
     arithmetic_case,
     memory_level,
+    roofline_bound,
+    step_traffic,
     triads_by_level,
 )
-from benchmarks.memory import SHARE_OF_MEMORY, sizes_that_fit
-from benchmarks.roofline import roofline_bound
+from benchmarks.scaling import SHARE_OF_MEMORY, sizes_that_fit
 from benchmarks.timing import CPU, time_turn
-from benchmarks.traffic import StepTraffic, step_traffic
 from scalpel_sim.validate.speed.machine import (
     CacheSizes,
     cache_sizes,

@@ -1,13 +1,13 @@
-"""`bench real-time` times whole frames in each mode, and after random strokes."""
+"""`real-time` times whole frames in each mode, and after random strokes."""
 
 import numpy as np
 import pytest
 
-from benchmarks.random_stroke import random_stroke
-from scalpel_sim.cli.app import command_line
-from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import SCENES
+from benchmarks.__main__ import benchmark_line
+from benchmarks.strokes import random_stroke
+from scalpel_sim.errors import EXIT_OK
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.scene.read import SCENES
 from scalpel_sim.validate.speed.measurements import load_results
 
 CASES = (
@@ -23,8 +23,8 @@ CASES = (
 
 def test_a_quick_look_has_a_row_for_each_mode_and_for_random_strokes(capsys, tmp_path):
     file = tmp_path / "real_time.json"
-    command = ["bench", "real-time", "--scenes", "grid2", "--quick", "--save", str(file)]
-    assert command_line(command) == EXIT_OK
+    command = ["real-time", "--scenes", "grid2", "--quick", "--save", str(file)]
+    assert benchmark_line(command) == EXIT_OK
     out = capsys.readouterr().out
     assert "p99.9" in out and "late %" in out
     found = {(m.case, m.quantity): m for m in load_results(file).measurements}
@@ -37,14 +37,6 @@ def test_a_quick_look_has_a_row_for_each_mode_and_for_random_strokes(capsys, tmp
         assert factor.median > 0.0
         assert found[case, "substeps"].median >= (1.0 if case.endswith("cutting") else 0.0)
         assert 0.0 <= found[case, "late frames"].median <= 100.0
-
-
-@pytest.mark.parametrize(
-    ("option", "known"), [(["--materials", "wood"], "liver"), (["--strokes", "-1"], "0 or more")]
-)
-def test_what_does_not_exist_is_refused(option, known, capsys):
-    assert command_line(["bench", "real-time", "--quick", *option]) == EXIT_WRONG_USE
-    assert known in capsys.readouterr().err
 
 
 def test_random_strokes_are_those_of_their_seed_and_cross_the_body():

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.random_stroke import random_stroke
+from benchmarks.strokes import random_stroke
 from bridge import LinkError, TcpLink
 from scalpel_sim import SCENES, Simulation, Viewer, prepare
 from scalpel_sim.hands.commands import Engage, Move, Turn

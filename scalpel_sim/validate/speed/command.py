@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from scalpel_sim.cli.console import log_to_stderr
-from scalpel_sim.cli.options import Flag, PrintOptions
 from scalpel_sim.errors import UsageError
+from scalpel_sim.runs.console import log_to_stderr
+from scalpel_sim.runs.options import PrintOptions
 from scalpel_sim.validate.speed.watch import Watch, watching
 
 if TYPE_CHECKING:  # `--help` should not wait for it
@@ -17,12 +17,13 @@ if TYPE_CHECKING:  # `--help` should not wait for it
 
 MOST_ROUNDS = 1000
 """More rounds are taken for a typing error."""
-SHORT_LARGEST = 20_250
-"""Largest body of the short set [tetrahedra]."""
+IN_CLONE = ("cut", "kernels", "peers", "real-time", "roofline", "scaling")
+"""Benchmarks of earlier versions that only a clone of the repository has."""
 
 bench = App(
     name="bench",
-    help="Measure the program on this machine: warm, in rounds in which the cases take turns.",
+    help="Measure the program on this machine: warm, in rounds in which the cases take turns. "
+    "More benchmarks come with a clone of the repository: `python -m benchmarks`.",
 )
 
 
@@ -39,37 +40,23 @@ class BenchOptions:
     "Compare with the results in this file, which --save wrote."
 
 
-Largest = Annotated[int | None, Parameter(help="Omit bodies of more tetrahedra than this.")]
-
-Names = Annotated[list[str] | None, Parameter(consume_multiple=True)]
-
-Benchmark = Callable[[Watch], "BenchmarkResult"]
-
-
 @bench.default
-def bench_short_set(
-    *,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
+def _bench_by_name(
+    *names: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
 ) -> None:
-    """Run a short set: the kernels in small bodies, one scene, and the limits of the machine."""
-    from benchmarks.kernels import measure_kernels
-    from benchmarks.roofline import measure_roofline
-    from scalpel_sim.validate.speed.scenes import measure_scenes
-
-    _run(
-        [
-            lambda watch: measure_kernels(options.runs, SHORT_LARGEST, watch),
-            lambda watch: measure_scenes(options.runs, ["slab"], watch),
-            lambda watch: measure_roofline(options.runs, SHORT_LARGEST, watch),
-        ],
-        options,
-        printing,
+    if names and names[0] in IN_CLONE:
+        raise UsageError(
+            f"bench {names[0]} is not part of the program: in a clone of the repository, run "
+            f"python -m benchmarks {names[0]}"
+        )
+    asked = f"there is no benchmark {names[0]!r}" if names else "name a benchmark"
+    raise UsageError(
+        f"{asked}: scenes or table1; in a clone of the repository python -m benchmarks has others"
     )
 
 
 @bench.command(name="scenes")
-def bench_scenes(
+def _bench_scenes(
     *names: str,
     options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
@@ -82,124 +69,11 @@ def bench_scenes(
     from scalpel_sim.validate.speed.scenes import checked_scene_names, measure_scenes
 
     chosen = checked_scene_names(names)
-    _run([lambda watch: measure_scenes(options.runs, chosen, watch)], options, printing)
-
-
-@bench.command(name="real-time")
-def bench_real_time(
-    *,
-    scenes: Names = None,
-    materials: Names = None,
-    strokes: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
-    quick: Flag = False,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Run whole strokes in each material, with account and viewer, and after random strokes.
-
-    Takes many minutes: choose with the options. For example:
-
-    ```console
-    scalpel-sim bench real-time --scenes organ --materials liver fat --runs 1
-    ```
-
-    Args:
-        scenes: organ, incision, slab, grid2, grid7 [default: all].
-        materials: Names of materials, or "as shipped" [default: that, and all].
-        strokes: After how many random strokes frames are timed [default: 0 10 26 50].
-        quick: Only the begin of each stroke, and the middle of a random one, as shipped, once.
-    """
-    from benchmarks.real_time import (
-        AS_SHIPPED,
-        STROKE_COUNTS,
-        checked_materials,
-        checked_strokes,
-        measure_real_time,
-    )
-    from scalpel_sim.validate.speed.scenes import checked_scene_names
-
-    chosen = checked_scene_names(scenes or ())
-    of_material = checked_materials(materials or ([AS_SHIPPED] if quick else []))
-    counts = checked_strokes(strokes or ((0, 1) if quick else STROKE_COUNTS))
-    runs = 1 if quick else options.runs
-    _run(
-        [
-            lambda watch: measure_real_time(
-                runs, chosen, of_material, counts, quick=quick, watch=watch
-            )
-        ],
-        options,
-        printing,
-    )
-
-
-@bench.command(name="kernels")
-def bench_kernels(
-    *,
-    largest: Largest = None,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Time forces, steps, a cut step and contact detection in 576 to 60,000 tetrahedra."""
-    from benchmarks.kernels import measure_kernels
-
-    _run([lambda watch: measure_kernels(options.runs, largest, watch)], options, printing)
-
-
-@bench.command(name="scaling")
-def bench_scaling(
-    *,
-    largest: Largest = None,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Time a step, and a local frame, in bodies of 576 to 1,000,000 tetrahedra."""
-    from benchmarks.local_frame import measure_local_frames
-    from benchmarks.scaling import measure_scaling
-
-    _run(
-        [
-            lambda watch: measure_scaling(options.runs, largest, watch),
-            lambda watch: measure_local_frames(options.runs, largest, watch),
-        ],
-        options,
-        printing,
-    )
-
-
-@bench.command(name="roofline")
-def bench_roofline(
-    *,
-    largest: Largest = None,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Measure bandwidth and arithmetic of this machine, and the share of them that a step uses."""
-    from benchmarks.roofline import measure_roofline
-
-    _run([lambda watch: measure_roofline(options.runs, largest, watch)], options, printing)
-
-
-@bench.command(name="peers")
-def bench_peers(
-    *,
-    largest: Largest = None,
-    python: Path | None = None,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Time MuJoCo flex, Newton and Rapier in turns with this engine, where they are installed.
-
-    Args:
-        python: The Python of an environment that has the engines that this one lacks.
-    """
-    from benchmarks.peers.benchmark import measure_peers
-
-    _run([lambda watch: measure_peers(options.runs, largest, python, watch)], options, printing)
+    run_benchmark(lambda watch: measure_scenes(options.runs, chosen, watch), options, printing)
 
 
 @bench.command(name="table1")
-def bench_table1(
+def _bench_table1(
     *,
     options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
@@ -207,27 +81,32 @@ def bench_table1(
     """Cut the three grids of the paper's Table 1 by each scheme, beside the paper's figures."""
     from scalpel_sim.validate.speed.table1 import measure_table1
 
-    _run([lambda watch: measure_table1(options.runs, watch=watch)], options, printing)
+    run_benchmark(lambda watch: measure_table1(options.runs, watch=watch), options, printing)
 
 
-@bench.command(name="cut")
-def bench_cut_steps(
-    *,
-    options: BenchOptions = BenchOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Time a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
-    from benchmarks.cut import measure_cut_steps
+def run_benchmark(
+    measure: "Callable[[Watch], BenchmarkResult | Sequence[BenchmarkResult]]",
+    options: BenchOptions,
+    printing: PrintOptions,
+) -> bool:
+    """Run a benchmark; print, save and compare its results.
 
-    _run([lambda watch: measure_cut_steps(options.runs, watch=watch)], options, printing)
+    Args:
+        measure: Measures and returns the results.
+        options: Number of rounds, and files.
+        printing: What is printed.
 
+    Returns:
+        Whether everything that the benchmark judges is as it should be.
 
-def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: PrintOptions) -> None:
-    """Run benchmarks; print, save and compare their results."""
-    from scalpel_sim.cli.run_setup import load_kernels
-    from scalpel_sim.output.file_check import check_file
+    Raises:
+        UsageError: an option is wrong.
+    """
+    from scalpel_sim.output.export import check_file
+    from scalpel_sim.runs.prepared_run import load_kernels
     from scalpel_sim.validate.speed.machine import load_average
     from scalpel_sim.validate.speed.measurements import (
+        BenchmarkResult,
         collect_results,
         load_results,
         results_as_json,
@@ -242,7 +121,8 @@ def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: Print
     load_at_start = load_average()
     with log_to_stderr(printing), watching(printing) as watch:
         load_kernels(printing)
-        found = [measure(watch) for measure in benchmarks]
+        measured = measure(watch)
+    found = [measured] if isinstance(measured, BenchmarkResult) else measured
     results = collect_results(found, load_at_start)
     text = results_as_json(results)
     if options.save is not None:
@@ -251,6 +131,7 @@ def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: Print
         print(text)
     elif not printing.quiet:
         _print(found, results, before)
+    return all(each.is_right for each in found)
 
 
 def _print(
@@ -259,7 +140,7 @@ def _print(
     """Print the results, and their comparison with those of another run."""
     from rich.console import Console
 
-    from scalpel_sim.validate.speed.compare import is_busy, print_comparison
+    from scalpel_sim.validate.speed.tables import is_busy, print_comparison
 
     console = Console()
     for each in found:

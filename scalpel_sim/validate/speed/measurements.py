@@ -1,11 +1,13 @@
 """The one format of benchmark results: measurements with unit, clock and spread, and their file."""
 
-import json
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import msgspec
 import numpy as np
+from msgspec.structs import asdict
 
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import versions
@@ -25,7 +27,22 @@ COUNTED = "counted"
 """Name of the clock of a quantity that is no time."""
 
 
-class Quantity(NamedTuple):
+class Clock(NamedTuple):
+    """A clock that a case is timed with."""
+
+    name: str
+    now: Callable[[], float]
+    """Returns the time since some fixed moment [s]."""
+
+
+CPU = Clock("CPU", time.thread_time)
+"""CPU time of this thread: other work on the machine does not count, except that it takes its share
+of caches and memory. For kernels, which do nothing but compute."""
+WALL = Clock("wall", time.perf_counter)
+"""Wall time, what a person waits for. For frames, whose deadline is in wall time."""
+
+
+class Quantity(msgspec.Struct, frozen=True):
     """What is measured, and in which unit."""
 
     benchmark: str
@@ -43,16 +60,9 @@ class Quantity(NamedTuple):
     """What to know before comparing it with another."""
 
 
-class Measurement(NamedTuple):
-    """The measured values of one quantity. Its first fields are those of `Quantity`."""
+class Measurement(Quantity, frozen=True, kw_only=True):
+    """The measured values of a quantity."""
 
-    benchmark: str
-    case: str
-    tetrahedra: int | None
-    quantity: str
-    unit: str
-    clock: str
-    better: str
     n: int
     """Number of samples."""
     median: float
@@ -66,10 +76,9 @@ class Measurement(NamedTuple):
     """Highest of the medians of the rounds."""
     rounds: int
     """Number of rounds."""
-    note: str = ""
 
 
-class Skipped(NamedTuple):
+class Skipped(msgspec.Struct, frozen=True):
     """Something that was not measured."""
 
     benchmark: str
@@ -80,23 +89,26 @@ class Skipped(NamedTuple):
 
 
 class BenchmarkResult(NamedTuple):
-    """What one benchmark measured."""
+    """Outcome of one benchmark."""
 
     measurements: list[Measurement]
     skipped: list[Skipped]
     show: Callable[["Console"], None]
     """Prints the result as a table."""
+    is_right: bool = True
+    """Whether everything that the benchmark judges is as it should be."""
 
 
-class SavedResults(NamedTuple):
+class SavedResults(msgspec.Struct, frozen=True):
     """The content of a results file."""
 
-    measurements: list[Measurement]
-    skipped: list[Skipped]
     machine: dict[str, Any]
     versions: dict[str, str]
     load: float
     """Mean number of running programs on the machine in the minute before the start."""
+    measurements: list[Measurement] = msgspec.field(name="figures")
+    skipped: list[Skipped]
+    format: str = FORMAT
 
 
 def summarise_times(
@@ -114,7 +126,7 @@ def summarise_times(
     median, p95, p99 = (convert(float(q)) for q in np.percentile(samples, (50, 95, 99)))
     medians = [convert(float(np.median(samples))) for samples in rounds]
     return Measurement(
-        **quantity._asdict(),
+        **asdict(quantity),
         n=len(samples),
         median=median,
         p95=p95,
@@ -130,7 +142,7 @@ def summarise_values(quantity: Quantity, values: Sequence[float]) -> Measurement
     best = 100.0 if quantity.better == HIGHER else 0.0
     median, p95, p99 = (float(np.percentile(values, abs(best - q))) for q in (50, 95, 99))
     return Measurement(
-        **quantity._asdict(),
+        **asdict(quantity),
         n=len(values),
         median=median,
         p95=p95,
@@ -149,25 +161,17 @@ def collect_results(found: Sequence[BenchmarkResult], load: float) -> SavedResul
         load: Load of the machine at the start.
     """
     return SavedResults(
-        measurements=[measurement for each in found for measurement in each.measurements],
-        skipped=[skipped for each in found for skipped in each.skipped],
         machine=describe_machine(),
         versions=versions(),
         load=load,
+        measurements=[measurement for each in found for measurement in each.measurements],
+        skipped=[skipped for each in found for skipped in each.skipped],
     )
 
 
 def results_as_json(results: SavedResults) -> str:
     """Return results as JSON text."""
-    content = {
-        "format": FORMAT,
-        "machine": results.machine,
-        "versions": results.versions,
-        "load": results.load,
-        "figures": [measurement._asdict() for measurement in results.measurements],
-        "skipped": [skipped._asdict() for skipped in results.skipped],
-    }
-    return json.dumps(content, indent=2, allow_nan=False)
+    return msgspec.json.format(msgspec.json.encode(results), indent=2).decode()
 
 
 def save_results(path: Path, text: str) -> None:
@@ -192,26 +196,19 @@ def load_results(path: Path) -> SavedResults:
         UsageError: the file is missing or unreadable, or is no results file of this format.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = msgspec.json.decode(path.read_bytes())
     except OSError as error:
         raise UsageError(
-            f"{path}: cannot be read ({error.strerror or error}); "
-            "make one with scalpel-sim bench --save FILE"
+            f"{path}: cannot be read ({error.strerror or error}); make one with --save FILE"
         ) from error
-    except ValueError as error:
+    except msgspec.DecodeError as error:
         raise UsageError(f"{path}: is no results file: it is not JSON ({error})") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise UsageError(
-            f"{path}: is no results file of this version, which begins with "
-            f'"format": "{FORMAT}"; make one with scalpel-sim bench --save FILE'
+            f"{path}: is no results file of this version, which has "
+            f'"format": "{FORMAT}"; make one with --save FILE'
         )
     try:
-        return SavedResults(
-            measurements=[Measurement(**each) for each in content["figures"]],
-            skipped=[Skipped(**each) for each in content["skipped"]],
-            machine=content["machine"],
-            versions=content["versions"],
-            load=float(content["load"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
+        return msgspec.convert(content, SavedResults)
+    except msgspec.ValidationError as error:
         raise UsageError(f"{path}: is a results file with parts missing ({error})") from error

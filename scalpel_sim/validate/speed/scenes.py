@@ -1,26 +1,25 @@
 """Whole runs of the scenes: the wall time of a frame of arm, bridge and tissue."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
-from benchmarks.timing import WALL
-from scalpel_sim.output.recording import Recording
 from scalpel_sim.output.summary import STAGES
-from scalpel_sim.preparation import prepare
-from scalpel_sim.scenes import SCENES, scene_called
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.recording.recording import Recording
+from scalpel_sim.scene.read import SCENES, scene_called
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.validate.speed.measurements import (
     HIGHER,
     NEITHER,
+    WALL,
     BenchmarkResult,
     Measurement,
     Quantity,
     summarise_times,
     summarise_values,
 )
-from scalpel_sim.validate.speed.tables import print_measurements
+from scalpel_sim.validate.speed.tables import as_rows
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from tissue import FloatArray
 
@@ -64,8 +63,7 @@ def measure_scenes(
             runs[name].append(simulation.recording)
             watch.tick(name)
     measured = [each for name in names for each in _measurements(name, sizes[name], runs[name])]
-    show = partial(print_measurements, "scenes", measured, [], about=_ABOUT)
-    return BenchmarkResult(measured, [], show)
+    return as_rows("scenes", measured, about=_ABOUT)
 
 
 def _run_scene(name: str, seconds: float | None) -> tuple[Simulation, int]:

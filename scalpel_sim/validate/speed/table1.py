@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from benchmarks.timing import WALL
-from scalpel_sim.output.recording import Recording
-from scalpel_sim.output.summary import STAGES
-from scalpel_sim.output.table_1 import MACHINE, TABLE_1
-from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scene_parts.choices import SCHEMES
-from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.output.summary import MACHINE, STAGES, TABLE_1
+from scalpel_sim.planned_cut import PlannedCut, prepare_cut
+from scalpel_sim.preparation.tissue import make_tissue
+from scalpel_sim.recording.recording import Recording
+from scalpel_sim.scene.body import GivenBody
+from scalpel_sim.scene.checks import SCHEMES
+from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.simulation import DrawFrame, Simulation
-from scalpel_sim.strokes.cuts import PlannedCut, prepare_cut
 from scalpel_sim.validate.speed.measurements import (
     COUNTED,
     HIGHER,
     LOWER,
     NEITHER,
+    WALL,
     BenchmarkResult,
     Measurement,
     Quantity,
@@ -121,11 +121,10 @@ def _measurements(runs: Sequence[GridRow]) -> list[Measurement]:
 def print_rows(rows: Sequence[GridRow], console: "Console") -> None:
     """Print the rows below the paper's."""
     title = "Table 1 of Bielser, Maiwald, Gross (1998); RX to other in % of the time"
-    table = compact_table(title)
-    table.add_column("cells", no_wrap=True)
-    table.add_column("scheme", no_wrap=True)
-    for heading in ("before", "after", "frames/s", *STAGES, "other"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    right = ("before", "after", "frames/s", *STAGES, "other")
+    table = compact_table(title, ("cells", "scheme"), right)
+    for column in table.columns:
+        column.no_wrap = True
     for cells, paper in TABLE_1.items():
         printed = [f"{paper.percent[stage]:.1f}" for stage in STAGES]
         rest = f"{100.0 - sum(paper.percent.values()):.1f}"

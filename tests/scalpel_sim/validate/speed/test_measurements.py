@@ -4,16 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.validate.speed.compare import (
-    FASTER,
-    NOT_COMPARED,
-    SAME,
-    SLOWER,
-    TOO_FEW,
-    compare_measurements,
-)
 from scalpel_sim.validate.speed.measurements import (
     FORMAT,
     HIGHER,
@@ -27,6 +20,14 @@ from scalpel_sim.validate.speed.measurements import (
     results_as_json,
     summarise_times,
     summarise_values,
+)
+from scalpel_sim.validate.speed.tables import (
+    FASTER,
+    NOT_COMPARED,
+    SAME,
+    SLOWER,
+    TOO_FEW,
+    compare_measurements,
 )
 
 
@@ -91,13 +92,13 @@ def test_a_higher_rate_is_faster_and_a_share_is_neither():
     slow, fast = (rate(48, [value] * 5) for value in (10.0, 20.0))
     assert verdict(slow, fast) == FASTER
     assert compare_measurements([slow], [fast])[0].ratio == pytest.approx(2.0)
-    assert verdict(slow._replace(better=NEITHER), fast._replace(better=NEITHER)) == NOT_COMPARED
+    assert verdict(*(replace(each, better=NEITHER) for each in (slow, fast))) == NOT_COMPARED
 
 
 def test_only_the_same_case_in_the_same_body_is_compared():
     assert compare_measurements([measured([[1.0]], case="another")], [measured([[1.0]])]) == []
     assert (
-        compare_measurements([measured([[1.0]])._replace(tetrahedra=48)], [measured([[1.0]])]) == []
+        compare_measurements([replace(measured([[1.0]]), tetrahedra=48)], [measured([[1.0]])]) == []
     )
 
 

@@ -1,0 +1,253 @@
+"""Costs around the frames of a scene: states, checks, surfaces, undo, long runs."""
+
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import get_args
+
+import numpy as np
+
+from benchmarks.frame import Stopwatches
+from benchmarks.timing import TurnWatch, time_calls
+from bridge import InProcessLink
+from scalpel_sim import Simulation, prepare
+from scalpel_sim.hands.commands import Engage, Move, Release, Undo
+from scalpel_sim.hands.run_controls import History, Pace, RunControls
+from scalpel_sim.hands.teleoperation import LiveHand
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
+from scalpel_sim.runs.options import Flag
+from scalpel_sim.runs.run import perform
+from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.scene.read import scene_called
+from scalpel_sim.scene.scene import changed
+from scalpel_sim.validate.speed.measurements import (
+    COUNTED,
+    CPU,
+    NEITHER,
+    WALL,
+    BenchmarkResult,
+    Clock,
+    Measurement,
+    Quantity,
+    summarise_times,
+    summarise_values,
+)
+from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.watch import SILENT
+from tissue import (
+    FloatArray,
+    SurfaceQuantity,
+    Tissue,
+    TissueState,
+)
+
+_DRAWN = 0.035
+"""How far a hand draws the blade in each stroke [m]."""
+_N_MEMORY = 10
+"""How often the memory of a long run is read."""
+
+
+def checked_steps(scene: str = "organ", /, *, no_audit: Flag = False) -> BenchmarkResult:
+    """Time the checks of each step, and the states that are saved to go back to.
+
+    CPU time of each step of a whole stroke without the stages in it: what remains is checked and
+    saved.
+
+    Args:
+        scene: Scene.
+        no_audit: Keep no account of the energy.
+    """
+    simulation = prepare(changed(scene_called(scene), audit=not no_audit))
+    tissue = _tissue_of(simulation)
+    simulation.step()
+    taken: dict[str, list[float]] = {"stages": [], "checks and a save": [], "checks, no save": []}
+    watches = Stopwatches(time.thread_time_ns)
+    detach = watches.attach(("tissue.tissue:Tissue.step", "tissue.tissue:Tissue._advance"))
+    try:
+        for _ in range(round(simulation.duration / simulation.dt)):
+            watches.spent.clear()
+            simulation.step()
+            kind = "checks, no save" if tissue._step_log.inputs else "checks and a save"
+            taken[kind].append(1e-9 * watches.spent["Tissue.step"])
+            taken["stages"].append(1e-9 * watches.spent["Tissue._advance"])
+    finally:
+        detach()
+    share = 100.0 * sum(map(sum, list(taken.values())[1:])) / sum(taken["stages"])
+    size = tissue.n_tetrahedra
+    measured = [
+        _times("checked-steps", case, size, np.array(seconds), CPU)
+        for case, seconds in taken.items()
+        if seconds
+    ]
+    shares = Quantity("checked-steps", "checks over stages", size, "share", "%", CPU.name)
+    measured.append(summarise_values(shares, [share]))
+    about = f"Steps of {scene}; {tissue.n_repeated_steps} were repeated."
+    return as_rows("checked steps", measured, about=about)
+
+
+def saved_state(scene: str = "organ", /, *, times: int = 50) -> BenchmarkResult:
+    """Time saving and loading the state of a scene: at rest, in the middle of its cut, after it.
+
+    Args:
+        scene: Scene.
+        times: Number of samples.
+    """
+    simulation = prepare(scene_called(scene))
+    tissue = _tissue_of(simulation)
+    measured: list[Measurement] = []
+    for when, share in (("at rest", 0.0), ("in mid-cut", 0.5), ("after", 1.0)):
+        simulation.run(share * simulation.duration + simulation.dt)
+        state, whole = tissue.save_state(), simulation.save_state()
+        states: list[TissueState] = []
+        cases: dict[str, Callable[[], object]] = {
+            "save, new memory": partial(_keep, states, tissue),
+            "save": tissue.save_state,
+            "load": partial(tissue.load_state, state),
+            "to bytes": state.to_bytes,
+            "save, with arm": simulation.save_state,
+            "load, with arm": partial(simulation.load_state, whole),
+            "save to bytes, with arm": lambda: simulation.save_state().to_bytes(),
+        }
+        measured += [
+            _times("saved-state", f"{when}: {case}", tissue.n_tetrahedra, time_calls(do, times))
+            for case, do in cases.items()
+        ]
+        quantity = Quantity(
+            "saved-state", f"{when}: size", tissue.n_tetrahedra, "size", "MB", COUNTED
+        )
+        measured.append(summarise_values(quantity, [1e-6 * len(state.to_bytes())]))
+    about = (
+        "A state in new memory is one of those that are kept for undo; else a state takes the "
+        "memory of an earlier one. A checkpoint takes `save to bytes, with arm` of the frame loop."
+    )
+    return as_rows(f"state of {scene}", measured, about=about)
+
+
+def _keep(states: list[TissueState], tissue: Tissue) -> None:
+    """Save a state whose memory is new, since others are kept."""
+    states.append(tissue.save_state())
+
+
+def surface_values(scene: str = "organ", /, *, times: int = 100) -> BenchmarkResult:
+    """Time the surface of a picture, and what colours it: displacement, strain and stress.
+
+    Args:
+        scene: Scene; it is in the middle of its cut.
+        times: Number of samples.
+    """
+    simulation = prepare(scene_called(scene))
+    simulation.run(0.6 * simulation.duration)
+    tissue = _tissue_of(simulation)
+    cases: dict[str, Callable[[], object]] = {"surface": tissue.surface}
+    for quantity in get_args(SurfaceQuantity):
+        cases[quantity] = partial(tissue.surface_values, quantity)
+    measured = [
+        _times("surface-values", case, tissue.n_tetrahedra, time_calls(do, times))
+        for case, do in cases.items()
+    ]
+    return as_rows(f"surface of {scene}", measured, about="In mid-cut.")
+
+
+def undo(scene: str = "organ", /, *, times: int = 10) -> BenchmarkResult:
+    """Time the undo of a cut: state, files, and the surface of the picture that shows it.
+
+    Args:
+        scene: Scene.
+        times: Number of cuts.
+    """
+    simulation = prepare(scene_called(scene), is_led=True)
+    hand = LiveHand(simulation)
+    hand.take_over(simulation)
+    controls = RunControls(Pace(), History(simulation), hand)
+    undone, drawn, areas = np.empty(times), np.empty(times), []
+    with Plotter() as plotter, tempfile.TemporaryDirectory() as folder:
+        outputs = Outputs(Path(folder), plotter)
+        controls.history.begin(outputs)
+        for i in range(times):
+            controls.commands += [Engage(), Move([0.0, _DRAWN, 0.0], 0.0)]
+            for _ in range(400):
+                controls.obey()
+                simulation.step()
+                outputs.write_forces(simulation.recording)
+            areas.append(simulation.result.cut_area)
+            size = simulation.result.n_tetrahedra
+            controls.commands += [Release(), Undo()]
+            start = WALL.now()
+            controls.obey()
+            undone[i] = WALL.now() - start
+            simulation.link.surface()
+            drawn[i] = WALL.now() - start
+        outputs.close()
+    measured = [
+        _times("undo", case, size, seconds)
+        for case, seconds in (("state and files", undone), ("with the surface", drawn))
+    ]
+    return as_rows("undo", measured, about=f"Cuts of {1e6 * median(areas):.0f} mm2 in {scene}.")
+
+
+def long_run(
+    watch: TurnWatch = SILENT, *, scene: str = "grid2", seconds: float = 60.0
+) -> BenchmarkResult:
+    """Measure memory and frames of a long run that is written, with checkpoints and without.
+
+    Args:
+        watch: Receives the progress.
+        scene: Scene, which rests after its stroke.
+        seconds: Simulated time [s].
+    """
+    measured: list[Measurement] = []
+    watch.begin(2)
+    for every in (CHECKPOINT_SECONDS, 0.0):
+        memory, taken, size = _long_run(scene, seconds, every)
+        with_checkpoints = f"a checkpoint every {every:g} s" if every else "no checkpoints"
+        measured.append(_times("long-run", f"{with_checkpoints}: frame", size, taken))
+        for part, n_bytes in enumerate(memory, start=1):
+            case = f"{with_checkpoints}: memory after {part} / {_N_MEMORY}"
+            quantity = Quantity("long-run", case, size, "memory", "MB", COUNTED, NEITHER)
+            measured.append(summarise_values(quantity, [1e-6 * n_bytes]))
+        watch.tick(with_checkpoints)
+    about = "Frames with all that is done between them. Memory: resident, of the process, on Linux."
+    return as_rows(f"{scene}, {seconds:g} s", measured, about=about)
+
+
+def _long_run(name: str, seconds: float, every: float) -> tuple[list[float], FloatArray, int]:
+    """Return memory at times [bytes], times between frames [s], and the number of tetrahedra."""
+    scene = changed(scene_called(name), seconds=seconds)
+    simulation = prepare(scene)
+    n_frames = round(seconds / simulation.dt)
+    clock, memory = np.zeros(n_frames), []
+
+    def after_frame(now: Simulation) -> None:
+        n = len(now.recording)
+        clock[n - 1] = time.perf_counter()
+        if n % (n_frames // _N_MEMORY) == 0:
+            lines = Path("/proc/self/status").read_text().splitlines()
+            memory.append(
+                1024.0 * float(next(x for x in lines if x.startswith("VmRSS")).split()[1])
+            )
+
+    with tempfile.TemporaryDirectory() as folder, Plotter() as plotter:
+        columns = simulation.recording.columns
+        outputs = Outputs(Path(folder), plotter, columns, checkpoint_seconds=every)
+        perform(
+            simulation, outputs, scene=scene, settings={}, seconds=seconds, every_frame=after_frame
+        )
+    return memory, np.diff(clock), simulation.result.n_tetrahedra
+
+
+def _tissue_of(simulation: Simulation) -> Tissue:
+    """Return the tissue of a simulation, which is in this process."""
+    assert isinstance(simulation.link, InProcessLink)
+    return simulation.link.tissue
+
+
+def _times(
+    benchmark: str, case: str, size: int, seconds: FloatArray, clock: Clock = WALL
+) -> Measurement:
+    """Return the measurement of a case that was timed some times, in ms."""
+    quantity = Quantity(benchmark, case, size, "time", "ms", clock.name)
+    return summarise_times(quantity, [seconds], lambda s: 1e3 * s)

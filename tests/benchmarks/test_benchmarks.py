@@ -1,0 +1,153 @@
+"""The benchmarks do the work that they describe, and report what they measured."""
+
+import re
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import BENCHMARKS, benchmark_line
+from benchmarks.frame import TIMED_PARTS, Stopwatches, Trace, trace_frame
+from benchmarks.kernels import kernels
+from benchmarks.roofline import roofline
+from benchmarks.scaling import (
+    RELAXATION_NAME,
+    SMALLEST_CUT,
+    cut,
+    cut_block,
+    measure_local_frames,
+    measure_steps,
+)
+from scalpel_sim.validate.speed.command import IN_CLONE
+from tests.measured import is_sane, printed
+
+
+def test_a_cut_does_the_same_work_in_a_body_of_any_size():
+    small, large = map(cut_block, (SMALLEST_CUT, 10_296))
+    assert large.splits.sum() == pytest.approx(small.splits.sum(), rel=0.05)
+    assert len(large.cut) == pytest.approx(len(small.cut), abs=1)
+    for slit in (small, large):
+        assert slit.splits.sum() > 100
+        assert slit.other.min() > 0.0 and 0.0 < slit.cut.min() < slit.cut.max()
+
+
+def test_every_step_of_a_cut_is_a_sample():
+    found = cut(2, largest=SMALLEST_CUT)
+    assert all(map(is_sane, found.measurements))
+    by_case = {each.case: each for each in found.measurements}
+    assert by_case["cut step"].n == by_case["split tetrahedron"].n > 10
+    # Each cut step splits several tetrahedra.
+    assert by_case["split tetrahedron"].median < by_case["cut step"].median
+
+
+def test_each_loop_is_timed_for_each_law_and_size_and_contact_between_two_blocks(capsys):
+    found = kernels(1, largest=5_400)
+    assert all(map(is_sane, found.measurements))
+    cases = {(each.case, each.tetrahedra) for each in found.measurements}
+    loops = ("forces", "Runge-Kutta step", "time step of 1 ms")
+    for law in ("springs", "neo-Hookean"):
+        assert {(f"{law}: {loop}", size) for loop in loops for size in (576, 5_400)} < cases
+    for loop in ("new search", "search", "forces of a step"):
+        assert (f"contact: {loop}", 10_800) in cases
+    text = printed(found, capsys)
+    assert "ns/tet" in text and "CPU" in text and "wall" in text and "p99" in text
+
+
+def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
+    found = measure_steps(1, (576, 6_000))
+    assert all(map(is_sane, found.measurements))
+    by_case = {
+        (each.case, each.quantity, each.tetrahedra): each.median for each in found.measurements
+    }
+    for law in ("springs", "neo-Hookean"):
+        step = f"{law}: Runge-Kutta step"
+        for size in (576, 6_000):
+            each, whole = by_case[step, "time per tetrahedron", size], by_case[step, "time", size]
+            assert each == pytest.approx(1e6 * whole / size)
+    assert "6,000" in printed(found, capsys)
+
+
+def test_a_local_frame_splits_a_dozen_in_a_body_of_any_size(capsys):
+    found = measure_local_frames(1, (6_000, 20_250))
+    assert all(map(is_sane, found.measurements))
+    by_case = {(each.case, each.tetrahedra): each for each in found.measurements}
+    small, large = (by_case[f"{RELAXATION_NAME}: cut frame", size] for size in (6_000, 20_250))
+    splits = [float(each.note.split()[0]) for each in (small, large)]
+    assert all(6.0 < n < 24.0 for n in splits)
+    assert (f"{RELAXATION_NAME}: blade moves, nothing split", 6_000) in by_case
+    assert "split in a cut frame" in printed(found, capsys)
+
+
+def test_a_roofline_reports_the_limits_the_needs_of_a_step_and_its_share(capsys):
+    found = roofline(1, largest=576)
+    assert all(map(is_sane, found.measurements))
+    by_case = {each.case: each for each in found.measurements}
+    shares = [share for case, share in by_case.items() if case.startswith("share")]
+    assert len(shares) == 3 and all(0.0 < share.median <= 100.0 for share in shares)
+    (whole,) = [share for share in shares if share.case.startswith("share of the limit")]
+    assert whole.median == max(share.median for share in shares)
+    text = printed(found, capsys)
+    assert "GB/s" in text and "GFLOP/s" in text
+    assert "bytes and" in text and "operations for each of" in text
+
+
+def test_a_call_into_a_file_that_was_left_is_a_return():
+    trace = Trace("made", 48, ["a", "b", "a", "c", "b"], dict.fromkeys("abc"))
+    assert trace.n_returns == 2
+
+
+def test_a_frame_that_cuts_is_traced_the_same_each_time():
+    first, again = (trace_frame("grid2", 2) for _ in range(2))
+    assert first == again
+    assert "tissue/tissue.py" in first.calls and "bridge/bridge.py" in first.calls
+    assert 20 < len(first.calls) < first.n_returns + len(first.calls) == len(first.entered)
+    assert all(a != b for a, b in zip(first.entered, first.entered[1:], strict=False))
+
+
+def test_stopwatches_are_put_on_parts_that_exist_and_taken_off():
+    from scalpel_sim.simulation import Simulation
+
+    before = Simulation.step
+    detach = Stopwatches().attach(TIMED_PARTS)
+    assert Simulation.step is not before
+    detach()
+    assert Simulation.step is before
+
+
+def test_time_inside_a_part_is_not_counted_twice():
+    watches = Stopwatches()
+    inner = watches.around("inner", lambda: np.linalg.inv(np.eye(200)))
+    watches.around("outer", inner)()
+    assert 0 < watches.spent["outer"] < watches.spent["inner"]
+
+
+def test_every_benchmark_that_left_the_program_is_there():
+    assert set(IN_CLONE) <= set(BENCHMARKS)
+
+
+@pytest.mark.parametrize("name", BENCHMARKS)
+def test_every_benchmark_has_help(name, capsys):
+    assert benchmark_line([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"python -m benchmarks {name}" in out and "--save" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["speed"], "speed"),
+        (["cut", "--runs", "0"], "--runs is 0"),
+        (["cut", "--save", "figures.txt"], "must end in .json"),
+        (["frame", "slap"], "Did you mean 'slab'"),
+        (["kernels", "--largest", "5"], "--largest is 5.*576"),
+        (["kernels", "--compare", "nothing.json"], "nothing.json: cannot be read"),
+        (["peers", "--python", "nowhere"], "--python is nowhere"),
+        (["real-time", "--quick", "--materials", "wood"], "liver"),
+        (["real-time", "--quick", "--strokes", "-1"], "0 or more"),
+    ],
+)
+def test_wrong_arguments_of_a_benchmark_are_refused(words, expected, capsys):
+    assert benchmark_line(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = (x for x in err.splitlines() if not x.startswith("compiling"))
+    assert re.search(expected, line)
