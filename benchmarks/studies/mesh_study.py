@@ -8,6 +8,7 @@ forces that the engine computes.
 """
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +23,9 @@ from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import FloatArray, Material, TetrahedralMesh, block, lattice_block
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
+
+_PAGE = Path(__file__).parents[2] / "docs" / "mesh_study.md"
+"""Page whose table is replaced."""
 
 SLENDERNESS = 8
 """Length over thickness."""
@@ -57,7 +61,7 @@ def mesh_study(
     Args:
         watch: Receives the progress.
         finest: Most cells through the thickness of the bar.
-        out: Folder of the page and the picture.
+        out: Folder of the page, whose table is replaced, and of the picture.
     """
     counts = [n for n in (1, 2, 4, 6, 8) if n <= finest]
     studied = models()
@@ -67,7 +71,8 @@ def mesh_study(
         studies.append(study(model, counts))
         watch.tick(model.name)
     out.mkdir(parents=True, exist_ok=True)
-    (out / "mesh_study.md").write_text(as_markdown(studies), encoding="utf-8")
+    page = _PAGE.read_text(encoding="utf-8")
+    (out / "mesh_study.md").write_text(page_with(studies, page), encoding="utf-8")
     draw(studies, out / "mesh_study.png")
     lines = [f"{rows[0].model}: sag {[f'{row.sag:.3f}' for row in rows]}" for rows in studies]
     lines.append(f"written: {out / 'mesh_study.md'}, {out / 'mesh_study.png'}")
@@ -275,8 +280,8 @@ def limit_of_meshes(coarse: float, fine: float, ratio: float) -> float:
     return fine + (fine - coarse) / (ratio**2 - 1.0)
 
 
-def as_markdown(studies: Sequence[Sequence[Row]]) -> str:
-    """Return the page of Markdown."""
+def page_with(studies: Sequence[Sequence[Row]], page: str) -> str:
+    """Return a page of Markdown with the rows of its table replaced."""
     text_rows = []
     for rows in studies:
         for row in rows:
@@ -287,44 +292,11 @@ def as_markdown(studies: Sequence[Sequence[Row]]) -> str:
         pairs += [(coarse.frequencies[mode], fine.frequencies[mode]) for mode in MODES]
         limits = [limit_of_meshes(a, b, fine.n / coarse.n) for a, b in pairs]
         text_rows.append(_text_row(rows[0].model, "limit", "", limits))
-    return TEXT.format(rows="\n".join(text_rows), modes=" | ".join(MODES))
+    return re.sub(r"(?<=-\|\n)(\| .*\n)+", "\n".join(text_rows) + "\n", page)
 
 
 def _text_row(model: str, n: str, n_tetrahedra: str, ratios: Sequence[float]) -> str:
     return f"| {model} | {n} | {n_tetrahedra} | " + " | ".join(f"{x:.3f}" for x in ratios) + " |"
-
-
-TEXT = """\
-# Mesh study: a clamped bar against theory
-
-A square bar, 8 times as long as thick, clamped at one end; n cells through its thickness, six
-tetrahedra each (`block`), or twelve (lattice: `lattice_block`). Every figure is divided by its
-theoretical value: 1 is right, a sag below 1 or a frequency above 1 is too stiff. Sag: under the
-bar's own weight, against Timoshenko's beam. Bending: Timoshenko's beam. Torsion: Saint-Venant.
-Stretching: the rod. "limit" extrapolates the last two meshes to elements of zero size, with an
-error that falls as the square of their size.
-
-| law | n | tetrahedra | sag | {modes} |
-|---|---|---|---|---|---|---|---|
-{rows}
-
-![Sag and first bending frequency over n](mesh_study.png)
-
-- **Springs** converge too, but to another material: on this mesh of cells, 1.03 times the Young's
-  modulus asked for, a Poisson's ratio of 0.03, and half the shear modulus along the axes, which
-  shows in torsion. `--spring-error` and `tissue.elasticity.spring_calibration` report this for any
-  mesh.
-- **Plain** linear tetrahedra lock, and the more so the less compressible they are. The engine does
-  not use them: it averages the dilatation over nodes, after which Poisson's ratio hardly matters.
-  The remaining error is the stiffness of linear tetrahedra in bending.
-- **A lattice** has less of it: a third to a half with as many cells, and 0.6 to 0.7 with as many
-  tetrahedra.
-- **The clamp** keeps the section from narrowing, which beam theory leaves free. So the limit at a
-  Poisson's ratio of 0, where nothing narrows, is nearest to 1, and the others are about 1 to 3 %
-  stiffer, as they should be.
-
-Made by `python -m benchmarks mesh-study`.
-"""
 
 
 def draw(studies: Sequence[Sequence[Row]], path: Path) -> None:
