@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.scene.case import CaseContent
     from scalpel_sim.validate.cases.runner import CaseRecord
     from scalpel_sim.validate.findings import ValidationScene
-    from scalpel_sim.validate.results import SceneRun
+    from scalpel_sim.validate.report import SceneRun
 
 JSON_FILE, PAGE_FILE = "validation.json", "validation.md"
 _FOLDER = Path("out/validate")
@@ -63,7 +63,7 @@ def validate(
     from scalpel_sim.output.summary import versions
     from scalpel_sim.runs.prepared_run import load_kernels
     from scalpel_sim.runs.run_folder import make_folder
-    from scalpel_sim.validate.results import count_verdicts, validation_as_json
+    from scalpel_sim.validate.report import count_verdicts, validation_as_json
     from scalpel_sim.validate.scenes import chosen_scenes
 
     out = out or _FOLDER
@@ -146,7 +146,7 @@ def _run(
     scenes: Sequence["ValidationScene"], *, quick: bool, printing: PrintOptions
 ) -> list["SceneRun"]:
     """Run the scenes one after the other, and print the title of each."""
-    from scalpel_sim.validate.results import SceneRun
+    from scalpel_sim.validate.report import SceneRun
 
     runs = []
     for i, scene in enumerate(scenes):
@@ -164,8 +164,7 @@ def _write(folder: Path, runs: Sequence["SceneRun"], text: str, *, quick: bool) 
     Raises:
         RunError: a file cannot be written.
     """
-    from scalpel_sim.validate.pictures import draw_plot
-    from scalpel_sim.validate.report import validation_page
+    from scalpel_sim.validate.report import draw_plot, validation_page
 
     names: dict[str, list[str]] = {}
     try:

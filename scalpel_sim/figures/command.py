@@ -49,8 +49,7 @@ def figure(
         check_choice("scheme", scheme, SCHEMES)
         check_file(path, ".png", "--output")
         from scalpel_sim.figures.figures import draw_figure
-        from scalpel_sim.figures.organ import draw_organ
-        from scalpel_sim.figures.two_hands import draw_two_hands
+        from scalpel_sim.figures.two_moments import draw_organ, draw_two_hands
         from scalpel_sim.runs.prepared_run import load_kernels
 
         load_kernels(printing)

@@ -21,8 +21,7 @@ from scalpel_sim.figures.cuts import (
     with_scheme,
 )
 from scalpel_sim.figures.mesh_drawing import draw_mesh
-from scalpel_sim.figures.rendering import SceneObject, render, texture_of
-from scalpel_sim.figures.table import table_below
+from scalpel_sim.figures.rendering import SceneObject, render, table_below, texture_of
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY

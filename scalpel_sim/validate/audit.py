@@ -12,12 +12,12 @@ from scalpel_sim.validate.block import (
     StrokeRecord,
     block_tissue,
     edge_at,
+    insertion_and_withdrawal,
     run_stroke,
     soft_material,
     straight_cut,
 )
 from scalpel_sim.validate.findings import THEORY, Check, Curve, Findings, Plot, ValidationScene
-from scalpel_sim.validate.puncturing import insertion_and_withdrawal
 from tissue import BladeSegment, BladeShape, Energies, FloatArray
 
 _LARGEST_RESIDUAL = 0.005

@@ -1,4 +1,4 @@
-"""What most scenes share: a block of soft material, strokes through it, and the record of one."""
+"""Parts of most scenes: a block of soft material, strokes through it, and the record of one."""
 
 import itertools
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,6 @@ from tissue import (
     BladeSegment,
     BladeShape,
     BladeSweep,
-    BoolArray,
     Energies,
     FloatArray,
     Law,
@@ -41,6 +40,8 @@ _EDGE_LENGTH = 0.03
 STEADY_RANGE = (0.3 * LENGTH, 0.75 * LENGTH)
 """Positions of the edge along the block between which a cut is steady [m]: the whole edge is in the
 block, and the far side is not yet near."""
+_ABOVE_BLOCK = 0.5e-3
+"""Height of the edge above the block at the start [m]."""
 
 
 def soft_material(
@@ -181,13 +182,14 @@ class StrokeRecord(NamedTuple):
         assert self.last.energies is not None, "the block has no audit"
         return self.last.energies
 
+    @property
+    def steady_resistance(self) -> float:
+        """Mean force against the motion along the block while the cut is steady [N]."""
+        return float(self.steady_rows(self.resistance).mean())
+
     def steady_rows(self, column: FloatArray) -> FloatArray:
         """Return the rows of a column while the cut is steady."""
-        return column[self._is_steady()]
-
-    def _is_steady(self) -> BoolArray:
-        """Return which rows belong to a steady cut, shape (n,)."""
-        return (self.y > STEADY_RANGE[0]) & (self.y < STEADY_RANGE[1])
+        return column[(self.y > STEADY_RANGE[0]) & (self.y < STEADY_RANGE[1])]
 
 
 def run_stroke(tissue: Tissue, poses: Iterable[BladeSegment], dt: float = DT) -> StrokeRecord:
@@ -202,3 +204,35 @@ def run_stroke(tissue: Tissue, poses: Iterable[BladeSegment], dt: float = DT) ->
         energy_rows=np.array([result.energies or () for result in results]),
         last=results[-1],
     )
+
+
+def insertion(
+    length: float,
+    depth: float,
+    speed: float,
+    *,
+    middle: tuple[float, float] = (CUT_X, 0.5 * LENGTH),
+    top: float = THICKNESS,
+) -> list[BladeSegment]:
+    """Return the poses of an edge that goes down.
+
+    Args:
+        length: Length of the edge, along y [m].
+        depth: How far below the top it goes [m].
+        speed: Speed of the edge [m/s].
+        middle: Coordinates of the middle of the edge, across and along the block [m].
+        top: Height of the top of the body [m].
+    """
+    n = round((depth + _ABOVE_BLOCK) / speed / DT)
+    heights: FloatArray = top + _ABOVE_BLOCK - np.linspace(0.0, depth + _ABOVE_BLOCK, n + 1)
+    x, y = middle[0], middle[1] - 0.5 * length
+    return [
+        edge_at((x, y, z), along=(0.0, 1.0, 0.0), forward=(0.0, 0.0, -1.0), length=length)
+        for z in heights
+    ]
+
+
+def insertion_and_withdrawal(length: float, depth: float, speed: float) -> list[BladeSegment]:
+    """Return the poses of an edge that goes down, and back up on the same path."""
+    down = insertion(length, depth, speed)
+    return down + down[-2::-1]

@@ -16,12 +16,12 @@ import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from scalpel_sim.validate.bar import bar_material
-from scalpel_sim.validate.beam_theory import (
+from scalpel_sim.validate.bar import (
     BAR_DENSITY,
     BAR_LENGTH,
     BAR_THICKNESS,
     GRAVITY,
+    bar_material,
 )
 from tissue import BoolArray, FloatArray
 

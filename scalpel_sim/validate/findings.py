@@ -123,3 +123,8 @@ class ValidationScene(NamedTuple):
 def within(share: float, of: float = 1.0) -> tuple[float, float]:
     """Return the bounds that deviate from `of` by a share of it."""
     return of * (1.0 - share), of * (1.0 + share)
+
+
+def farthest_from_one(shares: Sequence[float]) -> float:
+    """Return the share that is farthest from 1: the worst of several results."""
+    return max(shares, key=lambda share: abs(share - 1.0))

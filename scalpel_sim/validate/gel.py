@@ -68,7 +68,7 @@ def _force_per_depth(speed: float) -> float:
     record = run_stroke(
         block_tissue(MATERIALS["gelatin"].material), straight_cut(speed, begin=-0.001, end=end)
     )
-    return float(record.steady_rows(record.resistance).mean() / THICKNESS)
+    return record.steady_resistance / THICKNESS
 
 
 def _phantom_force_per_depth(depth: float) -> float:
@@ -77,7 +77,7 @@ def _phantom_force_per_depth(depth: float) -> float:
     y = np.arange(-0.003, 0.75 * LENGTH, 0.1 * DT)
     poses = [edge_at((CUT_X, at, THICKNESS - depth), length=depth + 0.01) for at in y]
     record = run_stroke(block_tissue(material, held="bottom", blade=BladeShape()), poses)
-    return float(record.steady_rows(record.resistance).mean() / depth)
+    return record.steady_resistance / depth
 
 
 def _measure(quick: bool) -> Findings:

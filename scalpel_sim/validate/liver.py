@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from scalpel_sim.validate.block import StrokeRecord, block_tissue, run_stroke
+from scalpel_sim.validate.block import StrokeRecord, block_tissue, insertion, run_stroke
 from scalpel_sim.validate.findings import (
     REGRESSION,
     THEORY,
@@ -17,7 +17,6 @@ from scalpel_sim.validate.findings import (
     ValidationScene,
     within,
 )
-from scalpel_sim.validate.puncturing import insertion
 from tissue import MATERIALS, BladeSegment, BladeShape, Energies, Material, Tissue, block
 
 _LIVER = MATERIALS["liver"].material

@@ -8,6 +8,7 @@ from scalpel_sim.validate.block import (
     THICKNESS,
     StrokeRecord,
     block_tissue,
+    insertion_and_withdrawal,
     run_stroke,
     soft_material,
 )
@@ -23,7 +24,6 @@ from scalpel_sim.validate.findings import (
     ValidationScene,
     within,
 )
-from scalpel_sim.validate.puncturing import insertion_and_withdrawal
 from tissue import BladeShape, Energies
 
 _NARROW = 0.001

@@ -49,7 +49,7 @@ def _force_at_speed(speed: float) -> float:
         toughness_speed=_DOUBLING_SPEED,
     )
     record = run_stroke(block_tissue(material), straight_cut(speed))
-    return float(record.steady_rows(record.resistance).mean())
+    return record.steady_resistance
 
 
 def _force_of_edge(radius: float) -> float:
@@ -59,7 +59,7 @@ def _force_of_edge(radius: float) -> float:
     )
     thin = BladeShape(thickness=1e-5, edge_radius=radius)  # so that its faces push nothing apart
     record = run_stroke(block_tissue(material, blade=thin), straight_cut(_DOUBLING_SPEED))
-    return float(record.steady_rows(record.resistance).mean())
+    return record.steady_resistance
 
 
 def _measure(quick: bool) -> Findings:

@@ -1,8 +1,16 @@
-"""The report of a validation: a table on the console, and a page of Markdown."""
+"""The report of a validation: a table on the console, a page of Markdown, JSON, and plots.
 
+Plots are drawn without pyplot, which would look for a display.
+"""
+
+import json
 import math
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
@@ -14,12 +22,47 @@ from scalpel_sim.validate.findings import (
     REGRESSION,
     THEORY,
     Check,
+    Findings,
+    Plot,
     Reference,
+    ValidationScene,
 )
-from scalpel_sim.validate.results import SceneRun, VerdictCounts, count_verdicts
 
 _STYLES = {PASS: "green", KNOWN: "yellow", FAIL: "bold red"}
 _NOT_CONFIRMED = "(not looked up: an estimate)"
+_FORMAT = "scalpel-sim validation 1"
+"""First entry of the file; the number changes where readers of older files would fail."""
+# Okabe and Ito's palette, whose colours remain distinct in colour blindness.
+_CURVE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
+_BAND_COLOURS = ("#999999", "#e69f00", "#56b4e9")
+_DOTS_PER_INCH = 100
+_MOST_MARKERS = 12
+"""Curves of no more points than this are drawn as points."""
+_MOST_INSIDE = 5
+"""A legend of more entries than this stands beside the plot."""
+
+
+class SceneRun(NamedTuple):
+    """A scene that was run."""
+
+    scene: ValidationScene
+    findings: Findings
+    seconds: float
+    """Wall time of the run on this machine [s]."""
+
+
+class VerdictCounts(NamedTuple):
+    """Number of checks by verdict."""
+
+    passed: int
+    known: int
+    failed: int
+
+
+def count_verdicts(runs: Sequence[SceneRun]) -> VerdictCounts:
+    """Return how many checks passed, deviate as known, and failed."""
+    verdicts = [check.verdict for run in runs for check in run.findings.checks]
+    return VerdictCounts(*(verdicts.count(verdict) for verdict in (PASS, KNOWN, FAIL)))
 
 
 def print_checks(runs: Sequence[SceneRun], console: Console) -> None:
@@ -144,3 +187,79 @@ def _reference(reference: Reference) -> str:
 def _cell(text: str) -> str:
     """Return text as a cell of a table: a bar would end it."""
     return text.replace("|", "\\|")
+
+
+def validation_as_json(runs: Sequence[SceneRun], *, quick: bool, versions: dict[str, str]) -> str:
+    """Return all findings as JSON text."""
+    content = {
+        "format": _FORMAT,
+        "quick": quick,
+        "versions": versions,
+        "passed": count_verdicts(runs).failed == 0,
+        "counts": count_verdicts(runs)._asdict(),
+        "scenes": [_scene_entry(run) for run in runs],
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _scene_entry(run: SceneRun) -> dict[str, Any]:
+    """Return a scene as JSON has it."""
+    scene = run.scene
+    return {
+        "name": scene.name,
+        "title": scene.title,
+        "about": scene.about,
+        "seconds": round(run.seconds, 1),
+        "lines": [_check_entry(check) for check in run.findings.checks],
+        "notes": list(run.findings.notes),
+        "sources": [reference._asdict() for reference in scene.references],
+    }
+
+
+def _check_entry(check: Check) -> dict[str, Any]:
+    """Return a check as JSON has it."""
+    return {
+        "name": check.name,
+        "figure": _finite(check.value),
+        "unit": check.unit,
+        "low": _finite(check.low),
+        "high": _finite(check.high),
+        "verdict": check.verdict,
+        "basis": check.basis,
+        "why": check.known.why if check.known and check.verdict == KNOWN else "",
+    }
+
+
+def _finite(number: float) -> float | None:
+    """Return a number, or None where it is not finite: JSON has no such numbers."""
+    return number if math.isfinite(number) else None
+
+
+def draw_plot(plot: Plot, path: Path) -> None:
+    """Write a plot as a PNG file."""
+    figure = Figure(figsize=(8.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    axes.set_title(plot.title, loc="left", fontsize=11, fontweight="bold")
+    for band, colour in zip(plot.bands, _BAND_COLOURS, strict=False):
+        axes.axhspan(band.low, band.high, color=colour, alpha=0.25, lw=0.0, label=band.label)
+    colour = _CURVE_COLOURS[-1]
+    n_drawn = 0
+    for curve in plot.curves:
+        if curve.is_theory:
+            axes.plot(curve.x, curve.y, color=colour, lw=1.0, ls="--", label=curve.label or None)
+            continue
+        colour = _CURVE_COLOURS[n_drawn % len(_CURVE_COLOURS)]
+        n_drawn += 1
+        as_points = len(curve.x) <= _MOST_MARKERS
+        shape = {"marker": "o", "ls": "", "ms": 5} if as_points else {"lw": 1.4}
+        axes.plot(curve.x, curve.y, color=colour, label=curve.label, **shape)
+    axes.set_xlabel(plot.x)
+    axes.set_ylabel(plot.y)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", lw=0.6)
+    axes.set_axisbelow(True)
+    if len(axes.get_legend_handles_labels()[0]) > _MOST_INSIDE:
+        figure.legend(frameon=False, fontsize=8, loc="outside right upper")
+    else:
+        axes.legend(frameon=False, fontsize=8, loc="best")
+    FigureCanvasAgg(figure).print_figure(path, dpi=_DOTS_PER_INCH, format="png")

@@ -17,9 +17,8 @@ from scalpel_sim.validate.reaction import REACTION_SCENE
 from scalpel_sim.validate.slicing import SLICING_SCENE
 from scalpel_sim.validate.spine import SPINE_SCENE
 from scalpel_sim.validate.steady import STEADY_SCENE
-from scalpel_sim.validate.stretch import STRETCH_SCENE
+from scalpel_sim.validate.stretch import STRETCH_SCENE, TENSION_SCENE
 from scalpel_sim.validate.symmetry import SYMMETRY_SCENE
-from scalpel_sim.validate.tension import TENSION_SCENE
 
 VALIDATION_SCENES: dict[str, ValidationScene] = {
     scene.name: scene

@@ -23,6 +23,7 @@ from scalpel_sim.validate.findings import (
     Plot,
     Reference,
     ValidationScene,
+    farthest_from_one,
     within,
 )
 from tissue import Law, Material, block
@@ -100,7 +101,7 @@ def check_steady_cuts(name: str, measured: Sequence[SteadyCut], toughness: float
         toughness: Toughness of the block [J/m2].
     """
     shares = [each.force / (toughness * THICKNESS) for each in measured]
-    worst = max(shares, key=lambda share: abs(share - 1.0))
+    worst = farthest_from_one(shares)
     ripple = max(each.ripple for each in measured)
     lowest = min(each.lowest for each in measured)
     return [

@@ -39,7 +39,7 @@ def _lateral_share(law: Law, cells: tuple[int, int, int], blade: BladeShape | No
     tissue = block_tissue(material, mesh=mirrored_block(cells), blade=blade)
     record = run_stroke(tissue, straight_cut(0.1, x=0.5 * BLOCK_SIZE[0]))
     lateral = np.abs(record.steady_rows(record.force[:, 0])).mean()
-    return float(lateral / record.steady_rows(record.resistance).mean())
+    return float(lateral / record.steady_resistance)
 
 
 def _measure(quick: bool) -> Findings:

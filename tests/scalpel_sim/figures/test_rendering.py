@@ -5,8 +5,7 @@ import pytest
 
 from scalpel_sim.figures.camera import Margins, fit_view, view_from
 from scalpel_sim.figures.light import SurfacePoints, illuminate, make_lights
-from scalpel_sim.figures.rendering import SceneObject, render
-from scalpel_sim.figures.table import table_below
+from scalpel_sim.figures.rendering import SceneObject, render, table_below
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.primitives import TriangleMesh
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
-from scalpel_sim.validate import bar, beam, beam_theory, clamped_solid, free_bar
+from scalpel_sim.validate import bar, beam, clamped_solid
 from scalpel_sim.validate.findings import FAIL, PASS
 from tissue import fixed_nodes
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
@@ -22,7 +22,7 @@ def verdicts(checks):
 @pytest.fixture
 def slender(monkeypatch):
     """A bar so slender that shear and rotary inertia do not count: E I and mass per length."""
-    monkeypatch.setattr(beam_theory, "BAR_THICKNESS", 1e-3)
+    monkeypatch.setattr(bar, "BAR_THICKNESS", 1e-3)
     return 1e6 * 1e-12 / 12.0, 1000.0 * 1e-6
 
 
@@ -30,13 +30,13 @@ def slender(monkeypatch):
 def test_the_period_of_a_slender_beam_is_eulers(slender, period, root):
     bending, per_length = slender
     euler = 2.0 * math.pi * 0.1**2 / root**2 * math.sqrt(per_length / bending)
-    assert getattr(beam_theory.beam_theory(0.0), period) == pytest.approx(euler, rel=1e-3)
+    assert getattr(bar.beam_theory(0.0), period) == pytest.approx(euler, rel=1e-3)
 
 
 def test_the_sag_of_a_slender_beam_is_eulers(slender):
     bending, per_length = slender
     weight = 9.81 * per_length * 0.1
-    theory = beam_theory.beam_theory(0.3)
+    theory = bar.beam_theory(0.3)
     assert theory.sag_of_weight == pytest.approx(weight * 0.1**3 / (8 * bending), rel=1e-3)
     assert theory.sag_of_load == pytest.approx(weight * 0.1**3 / (3 * bending), rel=1e-3)
 
@@ -47,7 +47,7 @@ def test_the_sag_of_a_slender_beam_is_eulers(slender):
 def shares_of_beam(poisson_ratio):
     solid, theory = (
         clamped_solid.clamped_solid(poisson_ratio),
-        beam_theory.beam_theory(poisson_ratio),
+        bar.beam_theory(poisson_ratio),
     )
     return [getattr(solid, name) / getattr(theory, name) for name in solid._fields]
 
@@ -89,13 +89,13 @@ def test_the_bar_sags_as_its_stiffness_matrix_says(coarse_bar):
 
 
 def test_a_bar_swings_with_the_frequency_that_its_sag_implies(coarse_bar):
-    theory = beam_theory.beam_theory(0.0)
+    theory = bar.beam_theory(0.0)
     stiffer = theory.sag_of_weight / coarse_bar.sag_of_weight
     slower = coarse_bar.period / theory.period
     assert slower == pytest.approx(math.sqrt(1.0 / stiffer), rel=0.02)
 
 
-@pytest.mark.parametrize("of", [beam_theory.beam_theory, clamped_solid.clamped_solid])
+@pytest.mark.parametrize("of", [bar.beam_theory, clamped_solid.clamped_solid])
 def test_a_bar_on_a_coarse_mesh_fails_and_one_that_does_as_theory_says_passes(coarse_bar, of):
     theory = of(0.0)
     assert verdicts(beam.check_bar("it", coarse_bar, theory)) == [FAIL] * 3
@@ -108,7 +108,7 @@ def test_a_bar_on_a_coarse_mesh_fails_and_one_that_does_as_theory_says_passes(co
 
 
 def test_a_bar_that_does_not_narrow_is_within_three_percent_on_six_cells(coarse_bar):
-    fine, theory = beam.swing(0.0, 6), beam_theory.beam_theory(0.0)
+    fine, theory = beam.swing(0.0, 6), bar.beam_theory(0.0)
     assert verdicts(beam.check_bar("it", fine, theory)) == [PASS] * 3
     assert verdicts(beam.check_bar("it", beam.extrapolated(coarse_bar, fine), theory)) == [PASS] * 3
 
@@ -124,19 +124,19 @@ def test_the_limit_of_an_error_of_second_order_has_none(coarse_bar):
 
 
 def test_a_free_bar_is_within_three_percent_on_a_lattice_of_six_cells():
-    bars = [free_bar.bent_and_let_go(0.45, across) for across in beam.CELLS_ACROSS]
-    checks = free_bar.check_free_bar("it", *bars)
+    bars = [beam.bent_and_let_go(0.45, across) for across in beam.CELLS_ACROSS]
+    checks = beam.check_free_bar("it", *bars)
     assert verdicts(checks) == [PASS] * 5
     assert checks[3].value == pytest.approx(1.0, abs=0.005)
 
 
 def free(across, *, error):
     """A bar that is too stiff by `error`, and swings with the frequency of that stiffness."""
-    return free_bar.FreeBar(across, 1.0 + error, (1.0 + error) ** -0.5)
+    return beam.FreeBar(across, 1.0 + error, (1.0 + error) ** -0.5)
 
 
 def test_a_free_bar_that_goes_to_theory_with_the_square_passes():
-    checks = free_bar.check_free_bar("it", free(3, error=0.08), free(6, error=0.02))
+    checks = beam.check_free_bar("it", free(3, error=0.08), free(6, error=0.02))
     assert verdicts(checks) == [PASS] * 5
     assert [check.value for check in checks[2:]] == pytest.approx([2.0, 1.0, 1.0])
 
@@ -151,13 +151,13 @@ def test_a_free_bar_that_goes_to_theory_with_the_square_passes():
     ],
 )
 def test_a_free_bar_that_goes_elsewhere_or_slower_fails(coarse, fine, expected):
-    checks = free_bar.check_free_bar("it", free(3, error=coarse), free(6, error=fine))
+    checks = beam.check_free_bar("it", free(3, error=coarse), free(6, error=fine))
     assert verdicts(checks) == expected
 
 
 def test_a_couple_at_an_end_has_no_resultant():
     mesh = bar.bar_mesh(2)
-    forces = free_bar.forces_of_couple(mesh, "right", 2e-3)
+    forces = beam.forces_of_couple(mesh, "right", 2e-3)
     np.testing.assert_allclose(forces.sum(axis=0), 0.0, atol=1e-15)
     moment = np.cross(mesh.positions - [0.1, 0.015, 0.015], forces).sum(axis=0)
     np.testing.assert_allclose(moment, [0.0, 2e-3, 0.0], atol=1e-15)

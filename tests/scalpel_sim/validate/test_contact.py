@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.validate.contact import Tilt, check_hertz, check_tilt
+from scalpel_sim.validate.contact import (
+    Tilt,
+    check_hertz,
+    check_tilt,
+    half_space,
+    hertz_force,
+    press_sphere,
+)
 from scalpel_sim.validate.findings import FAIL, PASS
-from scalpel_sim.validate.half_space import half_space, hertz_force, press_sphere
 
 
 def test_a_sphere_meets_the_force_of_hertz():

@@ -12,12 +12,14 @@ from scalpel_sim.validate.findings import (
     ValidationScene,
 )
 from scalpel_sim.validate.report import (
+    SceneRun,
     bounds_text,
+    count_verdicts,
+    validation_as_json,
     validation_page,
     value_text,
     verdict_sentence,
 )
-from scalpel_sim.validate.results import SceneRun, count_verdicts, validation_as_json
 
 CHECKS = [
     Check("|a|: good", 1.0, 0.9, 1.1, basis=THEORY, unit="N"),
