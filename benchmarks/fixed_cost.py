@@ -41,7 +41,7 @@ PARTS = (
     "tissue.tissue:Tissue._detect",
     "tissue.cutting.incision:Incision.detect",
     "tissue.tissue:Tissue._result",
-    "tissue.energy_audit:Audit.energies",
+    "tissue.stepping.energy_audit:Audit.energies",
 )
 """Modules, and functions or methods in them."""
 

@@ -23,7 +23,7 @@ from tissue import (
     Tissue,
     block,
 )
-from tissue.energy_audit import MeshChanges
+from tissue.stepping.energy_audit import MeshChanges
 
 SIZE = (0.04, 0.04, 0.02)
 N_STROKES = 5

@@ -20,7 +20,6 @@ from tissue.cutting.incision import CutHooks, Incision
 from tissue.cutting.scheme_choice import scheme_of
 from tissue.cutting.snapping import EXPLAINED
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.energy_audit import Audit
 from tissue.input_checks import (
     checked_edges,
     checked_fixed,
@@ -39,10 +38,10 @@ from tissue.integrators.equilibrium import SETTLED, settle
 from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
+from tissue.integrators.model import Numerics, assembled
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.step_context import Increment
 from tissue.integrators.step_length import expect_few_steps
-from tissue.integrators.system import Numerics, assembled
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.load import Loads
 from tissue.material import Material
@@ -54,7 +53,8 @@ from tissue.mesh.star import Visits
 from tissue.mesh.validation import expect_sound
 from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
-from tissue.state.repeated_steps import RepeatedSteps
+from tissue.stepping.checked_steps import RepeatedSteps
+from tissue.stepping.energy_audit import Audit
 from tissue.types import SchemeStatistics, StageTimes, StepResult, TetrahedralMesh
 
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))

@@ -7,7 +7,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray
 from tissue.fields.node_strain import largest_principal_strains
 from tissue.fields.node_stress import von_mises_stresses
-from tissue.loads.driven_body import DrivenBody
+from tissue.loads.handles import DrivenBody
 from tissue.mesh.surface import boundary_nodes
 from tissue.types import SurfaceQuantity
 

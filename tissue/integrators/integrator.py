@@ -5,9 +5,9 @@ from typing import Protocol
 from tissue.blade.blade_context import BladeContext
 from tissue.core.array_types import IntArray
 from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Hierarchical, IntegratorOptions
 from tissue.integrators.step_context import Increment
-from tissue.integrators.system import System
 from tissue.mesh.body import Body
 from tissue.mesh.moved_nodes import Moved
 
@@ -26,7 +26,7 @@ class Integrator(Protocol):
         ...
 
     def relax(
-        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
     ) -> int:
         """Relax (RX) by an increment; return how many steps the finest nodes took.
 
@@ -43,7 +43,7 @@ class Integrator(Protocol):
         """
         ...
 
-    def advance(self, system: System, increment: Increment) -> int:
+    def advance(self, system: TissueModel, increment: Increment) -> int:
         """Advance the motion by an increment; return how many steps the finest nodes took."""
         ...
 

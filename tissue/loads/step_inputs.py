@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.three_vectors import BladeSweep
-from tissue.integrators.system import System
+from tissue.integrators.model import TissueModel
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.load import Loads
 
@@ -31,7 +31,7 @@ def inputs_of(
     dt: float,
     loads: Loads,
     attachments: AttachmentList,
-    system: System,
+    system: TissueModel,
 ) -> StepInputs:
     """Return what acts on a body in the next step.
 
@@ -56,7 +56,7 @@ def inputs_of(
 
 
 def give_inputs(
-    inputs: StepInputs, loads: Loads, attachments: AttachmentList, system: System
+    inputs: StepInputs, loads: Loads, attachments: AttachmentList, system: TissueModel
 ) -> None:
     """Give a body what acts on it in a step, as `inputs_of` found it."""
     loads.forces = inputs.forces

@@ -44,7 +44,7 @@ RULES = StateRules(
     derived={
         "BladeInteraction._context": _none,
         "BladeInteraction._views": dict,
-        "System._context": _none,
+        "TissueModel._context": _none,
         "GlobalStepper._relaxation": _none,
         "StellarScheme._cut": _none,
         "BodyQueries._chunks": _none,

@@ -17,10 +17,10 @@ from tissue.integrators.hierarchical.kernels import (
     ring_frequencies,
 )
 from tissue.integrators.hierarchical.node_rings import grown_rings, new_rings
+from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.stability import SAFETY, largest_stable_step
 from tissue.integrators.step_context import Increment
-from tissue.integrators.system import System
 from tissue.integrators.unstable import not_finite
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
@@ -64,12 +64,12 @@ class HierarchicalStepper:
         return self._options.far == "frozen"
 
     def relax(
-        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
     ) -> int:
         """Relax by an increment, stage by stage; return how many steps the focus took."""
         return relax_in_stages(self, system, blade, increment, has_blade)
 
-    def advance(self, system: System, increment: Increment) -> int:
+    def advance(self, system: TissueModel, increment: Increment) -> int:
         """Advance the motion by one frame; return how many steps the nodes of the focus took."""
         options, body, edge = self._options, system.body, increment.edge
         self._find_rings(system)
@@ -83,13 +83,13 @@ class HierarchicalStepper:
         note_moved(self._moved, rings.order, rings.n_found)
         return n
 
-    def _find_rings(self, system: System) -> None:
+    def _find_rings(self, system: TissueModel) -> None:
         """Find the rings around what the blade holds."""
         find_held(self._held, system.body, system.interaction.state)
         springs, last = system.elasticity.arrays.springs, self._options.rings + 1
         find_rings(self._rings, self._held, springs, last, self._scratch)
 
-    def _divide(self, system: System, span: float) -> tuple[int, IntArray]:
+    def _divide(self, system: TissueModel, span: float) -> tuple[int, IntArray]:
         """Return how many micro steps to take in `span` [s], and after how many each ring moves."""
         body, by_node = system.body, system.elasticity.arrays.frequency_squared
         highest, options = self._highest, self._options
@@ -141,7 +141,7 @@ def ring_steps(options: Hierarchical, needed: Sequence[float]) -> tuple[int, Int
 
 def relax_in_stages(
     integrator: HierarchicalStepper,
-    system: System,
+    system: TissueModel,
     blade: BladeContext,
     increment: Increment,
     has_blade: bool,
@@ -174,7 +174,7 @@ def relax_in_stages(
     return n
 
 
-def _update_bounds(integrator: HierarchicalStepper, system: System, blade: BladeContext) -> bool:
+def _update_bounds(integrator: HierarchicalStepper, system: TissueModel, blade: BladeContext) -> bool:
     """Update the box around the body; return whether all positions are finite."""
     moving, body = integrator.moving, system.body
     if moving is None or 2 * moving[1] > body.n_nodes:

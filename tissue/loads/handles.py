@@ -6,23 +6,23 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from tissue.body_view import BodyQueries
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.simd import room_for_points
 from tissue.integrators.attachments import strand_boxes
 from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.step_context import Increment
 from tissue.integrators.supports import write_support_forces
-from tissue.integrators.system import System
 from tissue.loads.attachment import Attachment
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.ligament import Ligament, ends_of_strands
 from tissue.loads.load import Load, Loads
 from tissue.loads.material_points import MaterialPoints, points_of, region_mask
 from tissue.mesh.body import Body
-from tissue.mesh.body_queries import BodyQueries
 from tissue.solver_settings import SolverSettings
 from tissue.types import Chunks, TissueError
 
@@ -32,7 +32,7 @@ HOLDS = "nodes are supports where `Tissue(fixed=...)` says so"
 class DrivenBody(BodyQueries):
     """A body that is pushed by loads and by supports that move."""
 
-    _system: System
+    _system: TissueModel
     _loads: Loads
     _attachments: AttachmentList
     _global_stepper: GlobalStepper

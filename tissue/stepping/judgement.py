@@ -6,6 +6,7 @@ import numpy as np
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import SameTypes
+from tissue.integrators.model import TissueModel
 from tissue.integrators.step_judgement import (
     ACCEPTED,
     DISSIPATED,
@@ -22,7 +23,6 @@ from tissue.integrators.step_judgement import (
     judge_step,
     write_look,
 )
-from tissue.integrators.system import System
 from tissue.mesh.finite_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
@@ -51,7 +51,7 @@ class StepWatch:
         wave_speed: Speed of waves in it [m/s].
     """
 
-    def __init__(self, system: System, wave_speed: float) -> None:
+    def __init__(self, system: TissueModel, wave_speed: float) -> None:
         rest = system.body.rest[: system.body.n_nodes]
         mass = float(system.body.masses[: system.body.n_nodes].sum())
         self._bounds = StepBounds(
@@ -72,16 +72,16 @@ class StepWatch:
         self._write_look, self._judge = SameTypes(write_look), SameTypes(judge_step)
         self._is_finite = SameTypes(is_motion_finite)
 
-    def is_finite(self, system: System) -> bool:
+    def is_finite(self, system: TissueModel) -> bool:
         """Return whether all of the motion of the body is finite."""
         return self._is_finite.call(system.body)
 
-    def look(self, system: System) -> None:
+    def look(self, system: TissueModel) -> None:
         """Look at the body before a step."""
         self._write_look.call(system.context, self._bounds.before)
 
     def begin(
-        self, system: System, edge: Edge, when: float, work_of_loads: float, residual: float
+        self, system: TissueModel, edge: Edge, when: float, work_of_loads: float, residual: float
     ) -> None:
         """Look at the body before a step, and count from now on what it is given.
 
@@ -100,7 +100,7 @@ class StepWatch:
         bounds.residual = residual
 
     def fault(
-        self, system: System, dt: float, work_of_loads: float, residual: float, force: float
+        self, system: TissueModel, dt: float, work_of_loads: float, residual: float, force: float
     ) -> str | None:
         """Return what is wrong with a step since the last look; None: nothing.
 

@@ -13,8 +13,8 @@ from tissue.core.jit import kernel
 from tissue.elasticity.energy import kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
 from tissue.integrators.attachments import attached_energy
+from tissue.integrators.model import TissueModel
 from tissue.integrators.step_context import StepContext
-from tissue.integrators.system import System
 from tissue.types import Energies
 
 
@@ -96,7 +96,7 @@ def _write_amounts(
     out[13], out[14] = elastic.scaling.lost, totals.released
 
 
-def _attached(system: System) -> float:
+def _attached(system: TissueModel) -> float:
     """Return the energy in the springs of attachments [J]."""
     attachments = system.attachments
     if not len(attachments.nodes):
@@ -128,7 +128,7 @@ class Audit:
         self._now = self._at_first = _Amounts(*self._numbers)
         self._of: tuple[Edge | None, float] = (None, 0.0)
 
-    def begin(self, system: System, edge: Edge) -> None:
+    def begin(self, system: TissueModel, edge: Edge) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
         if not self._is_kept:
             return
@@ -148,12 +148,12 @@ class Audit:
         """Forget the energy: the body moved, or its mesh changed."""
         self._is_known = False
 
-    def before_cut(self, system: System, edge: Edge, when: float) -> None:
+    def before_cut(self, system: TissueModel, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
         if self._is_kept:
             self._before_cut = self._parts(system, edge, when)
 
-    def after_cut(self, system: System, edge: Edge, when: float) -> None:
+    def after_cut(self, system: TissueModel, edge: Edge, when: float) -> None:
         """Count the energy that the change of the mesh took; where it has not changed, none."""
         if self._is_kept and not self._is_known:
             parts = zip(
@@ -161,7 +161,7 @@ class Audit:
             )
             self.changes = MeshChanges(*(sum_ + after - before for sum_, before, after in parts))
 
-    def energies(self, system: System, edge: Edge) -> Energies | None:
+    def energies(self, system: TissueModel, edge: Edge) -> Energies | None:
         """Return the account at the end of a step; None where none is kept."""
         if not self._is_kept:
             return None
@@ -187,7 +187,7 @@ class Audit:
             released=now.released + attachments.released,
         )
 
-    def _amounts(self, system: System, edge: Edge, when: float) -> _Amounts:
+    def _amounts(self, system: TissueModel, edge: Edge, when: float) -> _Amounts:
         """Return the amounts now; they are remembered until the body moves or its mesh changes."""
         if not (self._is_known and self._of == (edge, when)):
             _write_amounts(system.context, edge, when, self._is_known, self._numbers)
@@ -195,7 +195,7 @@ class Audit:
             self._is_known = True
         return self._now
 
-    def _parts(self, system: System, edge: Edge, when: float) -> MeshChanges:
+    def _parts(self, system: TissueModel, edge: Edge, when: float) -> MeshChanges:
         """Return the energies of the body and of the anchors [J]."""
         now = self._amounts(system, edge, when)
         return MeshChanges(now.elastic, now.kinetic, now.potential, now.edge)

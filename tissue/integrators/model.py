@@ -1,4 +1,4 @@
-"""`System`: a body with everything that acts on it, as integrators advance it."""
+"""`TissueModel`: a body with everything that acts on it, as integrators advance it."""
 
 import math
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ usual run. Finding them costs half a step of the integrator. Until then a piece 
 loose is taken as held, and drag slows its fall."""
 
 
-class System:
+class TissueModel:
     """The owners of the arrays that take part in a step.
 
     Args:
@@ -265,7 +265,7 @@ def assembled(
     blade: BladeShape | None,
     floor: float | None,
     numerics: Numerics,
-) -> System:
+) -> TissueModel:
     """Return a body with its elasticity, its contact and the blade.
 
     Args:
@@ -296,4 +296,4 @@ def assembled(
         acts=numerics.moves_together,
     )
     owners = (body, elasticity, touching, interaction, surroundings, visits, node_size)
-    return System(*owners, damps_between_steps=numerics.damps_between_steps)
+    return TissueModel(*owners, damps_between_steps=numerics.damps_between_steps)

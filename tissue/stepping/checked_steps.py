@@ -17,13 +17,13 @@ from tissue.blade.edge import Edge
 from tissue.core.array_types import IntArray
 from tissue.core.three_vectors import BladeSweep
 from tissue.cutting.incision import NoRoomError
-from tissue.energy_audit import Audit
 from tissue.integrators.unstable import REMEDY, UnstableError
 from tissue.loads.step_inputs import StepInputs, give_inputs, inputs_of
 from tissue.mesh.body import Body
 from tissue.state.saved_body import SavedBody
 from tissue.state.step_log import StepLog, StepState
-from tissue.state.step_watch import StepWatch
+from tissue.stepping.energy_audit import Audit
+from tissue.stepping.judgement import StepWatch
 from tissue.types import StepResult, TissueError
 
 MOST_REPEATS = 3
