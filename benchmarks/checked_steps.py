@@ -42,8 +42,9 @@ def main() -> None:
     link = simulation.link
     assert isinstance(link, InProcessLink)
     tissue = link.tissue
-    whole, stages = Timed(tissue.step), Timed(tissue._advance)
-    vars(tissue).update(step=whole, _advance=stages)  # before the methods of its class
+    whole, stages = Timed(tissue.step), Timed(tissue._stages.advance)
+    vars(tissue).update(step=whole)  # before the methods of the classes
+    vars(tissue._stages).update(advance=stages)
     simulation.step()
     checked: list[float] = []
     others: list[float] = []
@@ -51,7 +52,7 @@ def main() -> None:
     n = round(simulation.duration / simulation.dt)
     for _ in range(n):
         simulation.step()
-        is_save = not tissue._step_log.inputs
+        is_save = not tissue._steps.inputs
         (saves if is_save else others).append(whole.taken - stages.taken)
         checked.append(stages.taken)
     cost = sum(saves) + sum(others)

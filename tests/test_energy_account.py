@@ -79,7 +79,7 @@ def account_of(law, relaxation):
         poses = itertools.pairwise(random_stroke(tissue, random))
         for sweep in (*itertools.starmap(BladeSweep, poses), *[None] * AFTER):
             energies.append(tissue.step(sweep, STROKE_DT).energies)
-            changes.append(tissue._audit.changes)
+            changes.append(tissue._stages.audit.changes)
         strokes.append(energies[-1])
     return Account(
         springs,

@@ -1,4 +1,5 @@
 from .blade.toughness import ToughnessLaw as ToughnessLaw
+from .blade.toughness import expect_toughness_in_range as expect_toughness_in_range
 from .blade.toughness import toughness_law_of as toughness_law_of
 from .blade_shape import BladeShape as BladeShape
 from .boundary_conditions import fixed_nodes as fixed_nodes
@@ -32,7 +33,6 @@ from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.connected_components import components as components
 from .geometry.rotations import are_rotations as are_rotations
 from .geometry.rotations import checked_rotation as checked_rotation
-from .input_checks import expect_toughness_in_range as expect_toughness_in_range
 from .integrators.options import Global as Global
 from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet

@@ -163,7 +163,7 @@ def _take_steps(stepper: GlobalStepper, system: TissueModel, edge: Edge, rate: f
     dt = STEPS_BETWEEN_LOOKS * step
     contact.begin()
     system.find_contacts(dt)
-    system.geoms.begin_step(system.body, dt)
+    system.find_geom_contacts(dt)
     velocities = system.body.velocities[:n]
     for i in range(STEPS_BETWEEN_LOOKS):
         velocities *= math.exp(-2.0 * rate * step)

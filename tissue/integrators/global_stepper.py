@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tissue.blade.blade_context import BladeContext
-from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
 from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
@@ -38,6 +37,7 @@ from tissue.integrators.threaded import Threads
 from tissue.integrators.unstable import UnstableError, not_finite
 from tissue.material import Law
 from tissue.mesh.body import Body
+from tissue.mesh.changes import ChangedMesh
 
 _ROOM = SameTypes(room_for_contact)
 
@@ -122,7 +122,7 @@ class GlobalStepper:
                 expect_stable(choice)
             if outcome == NOT_FINITE:
                 raise not_finite()
-            blade, stage = system.interaction.with_room(outcome, blade), arrays.stage
+            blade, stage = system.with_blade_room(outcome, blade), arrays.stage
         n = choice.done
         if n > 0:
             system.find_new_loose_pieces()
@@ -190,7 +190,7 @@ class GlobalStepper:
         relaxation.stage = stage
         return relaxation
 
-    def mesh_changed(self, nodes: IntArray) -> None:
+    def mesh_changed(self, changed: ChangedMesh) -> None:
         """Move the body again; `Solid.is_bound_current` says that bounds have changed."""
         self.wake()
 
@@ -207,7 +207,7 @@ class GlobalStepper:
         """Forget the bound on the strained body: it is another one now."""
         self._choice = None
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Do nothing: there are no arrays."""
 
 

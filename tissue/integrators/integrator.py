@@ -9,6 +9,7 @@ from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Hierarchical, IntegratorOptions
 from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.moved_nodes import Moved
 
 
@@ -47,16 +48,16 @@ class Integrator(Protocol):
         """Advance the motion by an increment; return how many steps the finest nodes took."""
         ...
 
-    def mesh_changed(self, nodes: IntArray) -> None:
-        """Take note that the mesh around these nodes changed."""
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Note that a pass of a cut changed the mesh."""
         ...
 
     def body_moved(self, body: Body) -> None:
         """Take note that every node moved by other means, and is at rest."""
         ...
 
-    def grow(self, n_nodes: int) -> None:
-        """Make room for that many nodes."""
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
         ...
 
 

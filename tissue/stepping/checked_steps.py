@@ -1,4 +1,4 @@
-"""`RepeatedSteps`: the step of `Tissue`, which is checked, and done again where it went wrong.
+"""`CheckedSteps`: steps that are checked, and done again where they went wrong.
 
 A step that is not accepted is rolled back: the state that was saved last is loaded, and the steps
 since are done again, which gives the same bits. Then it is tried with steps of the integrator of
@@ -7,23 +7,21 @@ and stops.
 """
 
 import logging
-from abc import abstractmethod
 from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
 
-from tissue.blade.edge import Edge
 from tissue.core.array_types import IntArray
+from tissue.core.memento import Memento, Spares
 from tissue.core.three_vectors import BladeSweep
 from tissue.cutting.incision import NoRoomError
 from tissue.integrators.unstable import REMEDY, UnstableError
-from tissue.loads.step_inputs import StepInputs, give_inputs, inputs_of
+from tissue.loads.handles import StepInputs
 from tissue.mesh.body import Body
-from tissue.state.saved_body import SavedBody
-from tissue.state.step_log import StepLog, StepState
-from tissue.stepping.energy_audit import Audit
+from tissue.state.tissue_state import RULES
 from tissue.stepping.judgement import StepWatch
+from tissue.stepping.stages import StepStages
 from tissue.types import StepResult, TissueError
 
 MOST_REPEATS = 3
@@ -32,97 +30,113 @@ MOST_REPEATS = 3
 NODES_NAMED = 5
 """Nodes that an error names at most, the worst first."""
 
+STEPS_BETWEEN_STATES = 1000
+"""Steps of the integrator after which a state is saved. To save one takes as long as six to ten of
+them in the organ, so that a run takes 0.8 % longer; to do steps again, half as long as these in the
+mean, a sixth of a second, which is rare."""
+
+MOST_FRAMES = 1000
+"""Time steps after which one is saved in any case: their inputs are kept."""
+
 _BEFORE = "a number of its state was not finite before the step"
 Returned = TypeVar("Returned")
 _log = logging.getLogger("tissue")
 
 
-class RepeatedSteps(SavedBody):
-    """A body whose steps are checked, and repeated where one went wrong."""
+class CheckedSteps:
+    """The steps of one tissue, each of which is accepted, or rolled back and repeated.
 
-    _audit: Audit
-    _edge_now: tuple[Edge, float]
-    _watch: StepWatch
-    _step_log: StepLog
-    _n_repeated = 0
+    Nothing here is a part of the state of the tissue.
 
-    @abstractmethod
-    def _advance(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Advance the body; see `step`."""
+    Args:
+        stages: The stages of a step, and all that they work on.
+    """
 
-    @property
-    def n_repeated_steps(self) -> int:
+    def __init__(self, stages: StepStages) -> None:
+        self._stages = stages
+        self.n_repeated = 0
         """Number of steps that went wrong, and were done again in shorter ones."""
-        return self._n_repeated
+        self.watch = StepWatch(stages.model, stages.material.wave_speed)
+        self.inputs: list[StepInputs] = []
+        """What acted in each time step since a state was saved."""
+        self._state: Memento | None = None
+        self._n_substeps = 0
+        self._spares = Spares()
+        self._is_changed = True
+        self._stopped: TissueError | None = None
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Advance the body by `dt` [s] while the blade does `sweep`.
-
-        A step is accepted if all positions and velocities are finite, no node leaves the box around
-        the body faster than nodes move, and the nodes have no more energy than they were given.
-        Otherwise it is done again in shorter steps of the integrator, up to three times. If that
-        fails, the body stays as it was before the step: it can still be read, but nothing that
-        changes it is accepted until `load_state`.
-
-        Args:
-            sweep: Motion of the cutting edge, or None where no blade is near.
-            dt: Length of the step [s]. It is divided as stability and the speed of the blade need.
-
-        Raises:
-            ValueError: the blade has no length, or one that does not fit the mesh; or a number is
-                not finite.
-            TissueError: the motion of the tissue became unstable, now or before; it names nodes.
-        """
+        """Do a step; see `tissue.Tissue.step`."""
         if self._stopped is not None:
-            self._expect_moving()
-        watch, log = self._watch, self._step_log
-        is_finite = watch.is_finite(self._system)
+            self.expect_moving()
+        stages, watch = self._stages, self.watch
+        is_finite = watch.is_finite(stages.model)
         if self._is_changed:
             if not is_finite:
-                raise self._stop(_BEFORE, _worst_nodes(self._body), is_repeated=False)
-            self._save_step()
-        inputs = inputs_of(sweep, dt, self._loads, self._attachments, self._system)
+                raise self._stop(_BEFORE, _worst_nodes(stages.model.body), is_repeated=False)
+            self.save()
+        inputs = stages.handles.inputs(sweep, dt)
         if not is_finite:
             return self._repeat(inputs, _BEFORE)
         if inputs.supports is not None:  # nodes may have got other velocities
-            watch.look(self._system)
+            watch.look(stages.model)
         result, fault = self._try(inputs)
         if result is None:
             return self._repeat(inputs, fault)
-        if log.add(inputs, result.n_substeps) or dt == 0.0:  # what that changed is in no account
-            self._save_step()
+        self.inputs.append(inputs)
+        self._n_substeps += result.n_substeps
+        is_due = self._n_substeps >= STEPS_BETWEEN_STATES or len(self.inputs) >= MOST_FRAMES
+        if is_due or dt == 0.0:  # what that changed is in no account
+            self.save()
         return result
 
-    def _begin_state(self) -> None:
-        """Begin to watch this body, before any cut."""
-        super()._begin_state()
-        self._watch = StepWatch(self._system, self.material.wave_speed)
-        self._step_log = StepLog()
+    def begin_change(self) -> StepStages:
+        """Note that the body is changed by other than a step; return what is changed.
 
-    def _with_room(self, change: Callable[[], Returned]) -> Returned:
+        Raises:
+            TissueError: it has stopped.
+        """
+        self.expect_moving()
+        self._is_changed = True
+        return self._stages
+
+    def state_loaded(self) -> None:
+        """Continue from the state that was loaded, also after the body has stopped."""
+        self._stopped, self._is_changed = None, True
+
+    def expect_moving(self) -> None:
+        """Refuse what changes a body that has stopped.
+
+        Raises:
+            TissueError: it has.
+        """
+        if self._stopped is not None:
+            raise TissueError(
+                f"the tissue has stopped, and takes no step or change until a state is loaded "
+                f"(`load_state`). Why it stopped: {self._stopped}"
+            )
+
+    def with_room(self, change: Callable[[], Returned]) -> Returned:
         """Do a change that may cut; where lists are full, again with more room."""
         while True:
             state = self._state_now()
             try:
                 return change()
             except NoRoomError as error:
-                state.restore(self)
-                self._make_more_room(error.lacking)
-
-    @abstractmethod
-    def _make_more_room(self, lacking: int) -> None:
-        """Make twice the room for what lacked it in a cut; see `NoRoomError`."""
+                state.restore()
+                self._stages.make_more_room(error.lacking)
 
     def _try(self, inputs: StepInputs) -> tuple[StepResult | None, str]:
         """Do a step after a look; return its result, or None and what was wrong with it."""
+        stages = self._stages
         try:
-            result = self._advance(inputs.sweep, inputs.dt)
+            result = stages.advance(inputs.sweep, inputs.dt)
         except NoRoomError as error:
-            refinement = self._global_stepper.refinement
-            self._go_back(inputs)
-            self._make_more_room(error.lacking)
-            self._save_step()
-            self._global_stepper.refinement = refinement
+            refinement = stages.global_stepper.refinement
+            self.go_back(inputs)
+            stages.make_more_room(error.lacking)
+            self.save()
+            stages.global_stepper.refinement = refinement
             return self._try(inputs)
         except UnstableError as error:
             return None, error.fault
@@ -133,8 +147,8 @@ class RepeatedSteps(SavedBody):
             raise
         energies = result.energies
         residual = 0.0 if energies is None else energies.residual
-        amounts = (self._audit.work_of_loads, residual, sum(result.wrench.numbers))
-        fault = self._watch.fault(self._system, float(inputs.dt), *amounts)
+        amounts = (stages.audit.work_of_loads, residual, sum(result.wrench.numbers))
+        fault = self.watch.fault(stages.model, float(inputs.dt), *amounts)
         return (result, "") if fault is None else (None, fault)
 
     def _repeat(self, inputs: StepInputs, fault: str) -> StepResult:
@@ -143,54 +157,58 @@ class RepeatedSteps(SavedBody):
         Raises:
             TissueError: it went wrong each time.
         """
-        worst = _worst_nodes(self._body)
-        self._go_back(inputs)
+        model, stepper = self._stages.model, self._stages.global_stepper
+        worst = _worst_nodes(model.body)
+        self.go_back(inputs)
         state = self._state_now()
-        self._watch.look(self._system)
+        self.watch.look(model)
         for i in range(1, MOST_REPEATS + 1):
-            self._global_stepper.refinement = 2**i
+            stepper.refinement = 2**i
             result, fault_again = self._try(inputs)
-            self._global_stepper.refinement = 1
+            stepper.refinement = 1
             if result is not None:
-                self._n_repeated += 1
+                self.n_repeated += 1
                 _log.warning("a step was repeated in steps of 1/%d the length: %s", 2**i, fault)
-                self._save_step()
+                self.save()
                 return result
-            fault, worst = fault_again, _worst_nodes(self._body)
-            state.restore(self)
+            fault, worst = fault_again, _worst_nodes(model.body)
+            state.restore()
         raise self._stop(fault, worst)
 
-    def _go_back(self, inputs: StepInputs) -> None:
+    def go_back(self, inputs: StepInputs) -> None:
         """Go back to before a step with these inputs, which is not in the log."""
-        log = self._step_log
-        assert log.state is not None
+        stages = self._stages
+        assert self._state is not None
         self._is_changed = True  # until it is saved: this can be interrupted
-        log.state.restore(self)
-        for each in log.inputs:
-            give_inputs(each, self._loads, self._attachments, self._system)
-            self._advance(each.sweep, each.dt)
-        give_inputs(inputs, self._loads, self._attachments, self._system)
+        self._state.restore()
+        for each in self.inputs:
+            stages.handles.give(each)
+            stages.advance(each.sweep, each.dt)
+        stages.handles.give(inputs)
 
-    def _state_now(self) -> StepState:
-        return StepState(self, self._step_log.spares)
-
-    def _save_step(self) -> None:
-        """Save the state, from which on steps are logged."""
-        log = self._step_log
-        log.state = None  # its memory is used again
-        log.begin(self._state_now())
-        system, audit = self._system, self._audit
-        energies = audit.energies(system, self._edge_now[0])
+    def save(self) -> None:
+        """Save the state, from which on inputs are kept."""
+        self._state = None  # its memory is used again
+        self._state = self._state_now()
+        self.inputs.clear()
+        self._n_substeps = 0
+        audit, model = self._stages.audit, self._stages.model
+        edge, when = model.interaction.edge_now
+        energies = audit.energies(model, edge)
         residual = 0.0 if energies is None else energies.residual
-        self._watch.begin(system, *self._edge_now, audit.work_of_loads, residual)
+        self.watch.begin(model, edge, when, audit.work_of_loads, residual)
         self._is_changed = False
+
+    def _state_now(self) -> Memento:
+        return Memento(self._stages, RULES, self._spares)
 
     def _stop(self, fault: str, nodes: IntArray, *, is_repeated: bool = True) -> TissueError:
         """Stop the body where it is; return the error that says why, and names nodes.
 
         `is_repeated`: whether the step was tried in shorter ones.
         """
-        x, n = self._body.positions, self.n_nodes
+        body = self._stages.model.body
+        x, n = body.positions, body.n_nodes
         places = ", ".join(
             f"{node} at ({x[node, 0]:.3g}, {x[node, 1]:.3g}, {x[node, 2]:.3g}) m"
             for node in nodes.tolist()

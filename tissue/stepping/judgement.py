@@ -1,28 +1,22 @@
 """`StepWatch`: whether a body may move as it did in a time step, by its own laws."""
 
 import math
+from typing import Final
 
 import numpy as np
 
 from tissue.blade.edge import Edge
-from tissue.core.jit import SameTypes
+from tissue.blade.forces import edge_energy
+from tissue.blade.side_contact import sides_energy
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import SameTypes, kernel
+from tissue.core.structs import Arrays, FloatCell
+from tissue.core.vec3 import dot, vec3
+from tissue.elasticity.internal_forces import elastic_energy
+from tissue.geometry.aabb import empty_box, with_point
+from tissue.integrators.attachments import attached_energy
 from tissue.integrators.model import TissueModel
-from tissue.integrators.step_judgement import (
-    ACCEPTED,
-    DISSIPATED,
-    FORCE_NOT_FINITE,
-    KINETIC,
-    LEFT_BOX,
-    LOOK_NUMBERS,
-    NOT_FINITE_NOW,
-    POTENTIAL,
-    TOO_FAST,
-    WORK,
-    StepBounds,
-    energy_in_springs,
-    judge_step,
-    write_look,
-)
+from tissue.integrators.step_context import StepContext
 from tissue.mesh.finite_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
@@ -36,24 +30,48 @@ SHARE_UNEXPLAINED = 0.5
 account of energy is exact to some percent; the elastic energy now, which is taken to be 0 here so
 that a step needs no look at the elements, is what makes the bound wide."""
 
-
 SPEED_GAINED = 10.0
 """Speed that a node may gain in a step, per speed of waves: at one already, tissue would be crushed
 before its waves carry the load away. More: 1e9 N on a node are an outlier for a step, in which it
 flies off, before its motion becomes unstable. Scenes stay at 3 % of the way that this allows."""
 
+IS_FINITE, LOW, HIGH, FASTEST_NODE, KINETIC, POTENTIAL, WORK, DISSIPATED = 0, 1, 4, 7, 8, 9, 10, 11
+"""Places in what `write_look` writes:
+
+IS_FINITE, 1 if all positions and velocities are finite numbers, else 0; LOW and HIGH, three each,
+the corners of the box around the nodes [m]; FASTEST_NODE, the speed of the fastest node, fixed ones
+too [m/s]; KINETIC, the kinetic energy of the nodes that are not fixed, and POTENTIAL, the energy in
+gravity [J]; WORK, that of blade and supports so far, and DISSIPATED, what damping, cutting and
+friction took so far, as far as it is counted [J]."""
+
+LOOK_NUMBERS = 12
+"""Numbers that `write_look` writes."""
+
+ACCEPTED: Final = 0
+"""Nothing is wrong with a step."""
+NOT_FINITE_NOW: Final = 1
+"""A position or a velocity is not a finite number."""
+LEFT_BOX: Final = 2
+"""A node left the box around the body faster than nodes move."""
+TOO_FAST: Final = 3
+"""The nodes have more energy than the body was given."""
+OUT_OF_NOTHING: Final = 4
+"""The account of energy says that there is more than was given."""
+FORCE_NOT_FINITE: Final = 5
+"""The force on the blade is not a finite number."""
+
 
 class StepWatch:
-    """Looks at a body after each step, and before one where it was not left as it was then.
+    """Judges the body after each step by what it was before.
 
     Args:
-        system: The body.
+        model: The body.
         wave_speed: Speed of waves in it [m/s].
     """
 
-    def __init__(self, system: TissueModel, wave_speed: float) -> None:
-        rest = system.body.rest[: system.body.n_nodes]
-        mass = float(system.body.masses[: system.body.n_nodes].sum())
+    def __init__(self, model: TissueModel, wave_speed: float) -> None:
+        rest = model.body.rest[: model.body.n_nodes]
+        mass = float(model.body.masses[: model.body.n_nodes].sum())
         self._bounds = StepBounds(
             before=np.zeros(LOOK_NUMBERS),
             after=np.zeros(LOOK_NUMBERS),
@@ -64,7 +82,7 @@ class StepWatch:
             residual=0.0,
             excess=0.0,
             diagonal=float(np.linalg.norm(np.ptp(rest, axis=0))),
-            gravity=math.hypot(*system.surroundings.gravity),
+            gravity=math.hypot(*model.surroundings.gravity),
             speed_gained=float(SPEED_GAINED * wave_speed),
             unexplained=0.5 * mass * (STRAIN_UNEXPLAINED * wave_speed) ** 2,
             share_unexplained=SHARE_UNEXPLAINED,
@@ -72,47 +90,47 @@ class StepWatch:
         self._write_look, self._judge = SameTypes(write_look), SameTypes(judge_step)
         self._is_finite = SameTypes(is_motion_finite)
 
-    def is_finite(self, system: TissueModel) -> bool:
+    def is_finite(self, model: TissueModel) -> bool:
         """Return whether all of the motion of the body is finite."""
-        return self._is_finite.call(system.body)
+        return self._is_finite.call(model.body)
 
-    def look(self, system: TissueModel) -> None:
+    def look(self, model: TissueModel) -> None:
         """Look at the body before a step."""
-        self._write_look.call(system.context, self._bounds.before)
+        self._write_look.call(model.context, self._bounds.before)
 
     def begin(
-        self, system: TissueModel, edge: Edge, when: float, work_of_loads: float, residual: float
+        self, model: TissueModel, edge: Edge, when: float, work_of_loads: float, residual: float
     ) -> None:
         """Look at the body before a step, and count from now on what it is given.
 
         Args:
-            system: The body.
+            model: The body.
             edge: The cutting edge over the last time step.
             when: Instant of it, as a fraction.
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy now, if one is kept, else 0 [J].
         """
         bounds, now = self._bounds, self._bounds.before
-        self.look(system)
-        own = float(now[KINETIC]) + energy_in_springs(system.context, edge, when)
+        self.look(model)
+        own = float(now[KINETIC]) + energy_in_springs(model.context, edge, when)
         bounds.without_gravity, bounds.potential = own, float(now[POTENTIAL])
         bounds.work, bounds.dissipated = float(now[WORK]) + work_of_loads, float(now[DISSIPATED])
         bounds.residual = residual
 
     def fault(
-        self, system: TissueModel, dt: float, work_of_loads: float, residual: float, force: float
+        self, model: TissueModel, dt: float, work_of_loads: float, residual: float, force: float
     ) -> str | None:
         """Return what is wrong with a step since the last look; None: nothing.
 
         Args:
-            system: The body after it.
+            model: The body after it.
             dt: Length of the step [s].
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy after it, if one is kept, else 0 [J].
             force: A sum of what the blade feels: finite, or not.
         """
         bounds = self._bounds
-        found = self._judge.call(system.context, bounds, dt, work_of_loads, residual, force)
+        found = self._judge.call(model.context, bounds, dt, work_of_loads, residual, force)
         return None if found == ACCEPTED else self._named(found)
 
     def _named(self, found: int) -> str:
@@ -130,3 +148,150 @@ class StepWatch:
                 f"{excess:.3g} J more than blade, loads and gravity gave"
             )
         return f"{excess:.3g} J of energy came out of nothing"
+
+
+class StepBounds(Arrays):
+    """What a step of a body is judged by."""
+
+    before: FloatArray
+    """What `write_look` wrote before the step, shape (`LOOK_NUMBERS`,)."""
+    after: FloatArray
+    """What it wrote after the step that was judged last, shape (`LOOK_NUMBERS`,)."""
+    without_gravity: FloatCell
+    """Energy of the body when counting began: elastic and kinetic, and in all that holds and
+    touches it [J]."""
+    potential: FloatCell
+    """Energy in gravity then [J]."""
+    work: FloatCell
+    """Work done on it until then [J]."""
+    dissipated: FloatCell
+    """Energy taken from it until then [J]."""
+    residual: FloatCell
+    """`Energies.residual` then, where an account of energy is kept, else 0 [J]."""
+    excess: FloatCell
+    """By how much the step that was judged last was off: in m, or in J."""
+    diagonal: float
+    """Length of the body at rest [m]."""
+    gravity: float
+    """Acceleration of free fall [m/s2]."""
+    speed_gained: float
+    """Speed that a node may gain in a step in addition to that by gravity [m/s]."""
+    unexplained: float
+    """Energy that may come out of nothing [J]."""
+    share_unexplained: float
+    """The same as a share of the energy that there was and of what was done and taken since."""
+
+
+@kernel
+def write_look(context: StepContext, out: FloatArray) -> None:
+    """Look at the body; it costs one pass over the nodes.
+
+    Args:
+        context: The body and all that acts on it.
+        out: Written, shape (`LOOK_NUMBERS`,).
+    """
+    body, gravity = context.body, context.surroundings.gravity
+    box, is_finite = empty_box(), True
+    squared = kinetic = potential = 0.0
+    for node in range(body.n_nodes):
+        x, v = vec3(body.positions, node), vec3(body.velocities, node)
+        speed_squared, mass = dot(v, v), body.masses[node]
+        # A comparison with nan is false: min and max would overlook it.
+        is_finite = is_finite and math.isfinite(x.x + x.y + x.z + speed_squared)
+        box = with_point(box, x)
+        squared = max(squared, speed_squared)
+        kinetic += 0.0 if body.fixed[node] else 0.5 * mass * speed_squared
+        potential -= (mass - body.added_masses[node]) * dot(gravity, x)
+    for c in range(3):
+        out[LOW + c], out[HIGH + c] = box.low[c], box.high[c]
+    totals, attachments = context.blade.totals, context.attachments
+    out[IS_FINITE] = 1.0 if is_finite else 0.0
+    out[FASTEST_NODE], out[KINETIC], out[POTENTIAL] = math.sqrt(squared), kinetic, potential
+    out[WORK] = totals.work_of_blade + context.supports.work
+    spent = totals.work_of_cutting + totals.work_of_breaking + totals.work_of_friction
+    spent += attachments.dissipated + attachments.severing
+    out[DISSIPATED] = context.damping.dissipated + spent
+
+
+@kernel
+def energy_in_springs(context: StepContext, edge: Edge, when: float) -> float:
+    """Return the energy in the body's strain, and in all that holds and touches it [J].
+
+    Args:
+        context: The body and all that acts on it.
+        edge: The cutting edge over a time step.
+        when: Instant of it, as a fraction.
+    """
+    body, blade, attachments = context.body, context.blade, context.attachments
+    held: float = edge_energy(blade, body, edge, when) + sides_energy(blade.sides)
+    held += context.contacts.stored
+    held += attached_energy(attachments, body.positions, 0, len(attachments.nodes))
+    energy: float = elastic_energy(context.elastic, body) + held
+    return energy
+
+
+@kernel
+def judge_step(
+    context: StepContext,
+    bounds: StepBounds,
+    dt: float,
+    work_of_loads: float,
+    residual: float,
+    force: float,
+) -> int:
+    """Return ACCEPTED, or what is wrong with a step.
+
+    What is seen after a step that is accepted is what is there before the next one.
+
+    Args:
+        context: The body after the step, and all that acts on it.
+        bounds: What it is judged by; `before`, `after` and `excess` are written.
+        dt: Length of the step [s].
+        work_of_loads: Work of loads so far [J].
+        residual: `Energies.residual`, where an account of energy is kept, else 0 [J].
+        force: A sum of what the blade feels: finite, or not.
+    """
+    before, after = bounds.before, bounds.after
+    write_look(context, after)
+    if after[IS_FINITE] != 1.0:
+        return NOT_FINITE_NOW
+    # In no time nothing moves, and a blade that cuts is where no motion has led it.
+    found = ACCEPTED if dt == 0.0 else _fault(bounds, dt, work_of_loads, residual)
+    if found != ACCEPTED:
+        return found
+    if not math.isfinite(force):
+        return FORCE_NOT_FINITE
+    for i in range(LOOK_NUMBERS):
+        before[i] = after[i]
+    return ACCEPTED
+
+
+@kernel
+def _fault(bounds: StepBounds, dt: float, work_of_loads: float, residual: float) -> int:
+    """Return ACCEPTED, or which law the motion in a step breaks; see `judge_step`."""
+    before, after = bounds.before, bounds.after
+    # The sides of the box move as fast as nodes do; what turns round within the step moves by
+    # less than the body is long.
+    speed = 2.0 * before[FASTEST_NODE] + bounds.speed_gained
+    reach = bounds.diagonal + speed * dt + bounds.gravity * dt * dt
+    way = 0.0
+    for c in range(3):
+        way = max(way, before[LOW + c] - after[LOW + c], after[HIGH + c] - before[HIGH + c])
+    if not way <= reach:
+        bounds.excess = way
+        return LEFT_BOX
+    work = abs(after[WORK] + work_of_loads - bounds.work)
+    dissipated = after[DISSIPATED] - bounds.dissipated
+    allowed = bounds.unexplained
+    allowed += bounds.share_unexplained * (abs(bounds.without_gravity) + work + dissipated)
+    # In either direction: a blade that is led backward takes hold of tissue that is bent already,
+    # and what that gives it is not counted as work.
+    given = bounds.without_gravity + (bounds.potential - after[POTENTIAL]) + work
+    excess = after[KINETIC] - given
+    if not excess <= allowed:
+        bounds.excess = excess
+        return TOO_FAST
+    if not bounds.residual - residual <= allowed:
+        bounds.excess = bounds.residual - residual
+        return OUT_OF_NOTHING
+    return ACCEPTED

@@ -28,7 +28,7 @@ def test_every_engine_gets_the_masses_and_springs_of_ours(body):
     with np.load(body) as given:
         ours = Tissue(mesh, block_material("springs"))
         assert given["masses"] == pytest.approx(ours.snapshot().masses)
-        springs = ours._system.elasticity.arrays.springs
+        springs = ours._model.elasticity.arrays.springs
         row = slice(springs.first[100], springs.first[100] + springs.count[100])
         theirs = {frozenset(e): k for e, k in zip(given["edges"].tolist(), given["stiffness"],
                                                   strict=True)}  # fmt: skip

@@ -24,6 +24,7 @@ from tissue.integrators.step_context import Increment
 from tissue.integrators.unstable import not_finite
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 
 
@@ -103,16 +104,17 @@ class HierarchicalStepper:
             needed.append(span / (SAFETY * step))
         return ring_steps(options, needed)
 
-    def mesh_changed(self, nodes: IntArray) -> None:
+    def mesh_changed(self, changed: ChangedMesh) -> None:
         """Note nodes that may be new: they may have moved as others did."""
-        note_moved(self._moved, nodes, len(nodes))
+        note_moved(self._moved, changed.nodes, len(changed.nodes))
 
     def body_moved(self, body: Body) -> None:
         """Note every node."""
         note_moved(self._moved, np.arange(body.n_nodes), body.n_nodes)
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes."""
+        del n_tetrahedra
         self._rings = grown_rings(self._rings, n_nodes)
         self._held = grown_rings(self._held, n_nodes)
         self._scratch = np.zeros(n_nodes, np.int64)
@@ -161,6 +163,7 @@ def relax_in_stages(
     interaction, edge = system.interaction, increment.edge
     faces_of = edge if has_blade else None
     interaction.update_faces(blade, integrator.moved, faces_of, increment.begin)
+    system.renew_context()
     n = integrator.advance(system, increment) if increment.span > 0.0 else 0
     if n > 0:
         system.relax_stress(increment.span)
@@ -171,10 +174,13 @@ def relax_in_stages(
     if has_blade:
         external, blade = system.stages.external, interaction.renewed(blade)
         interaction.update_anchors(blade, external, integrator.moved, edge, increment.end)
+        system.renew_context()
     return n
 
 
-def _update_bounds(integrator: HierarchicalStepper, system: TissueModel, blade: BladeContext) -> bool:
+def _update_bounds(
+    integrator: HierarchicalStepper, system: TissueModel, blade: BladeContext
+) -> bool:
     """Update the box around the body; return whether all positions are finite."""
     moving, body = integrator.moving, system.body
     if moving is None or 2 * moving[1] > body.n_nodes:
