@@ -10,7 +10,8 @@ import numpy as np
 from scalpel_sim.bench.machine import describe_machine
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import versions
-from tissue import FloatArray, whole_file
+from tissue import FloatArray
+from tissue.support import whole_file
 
 if TYPE_CHECKING:
     from rich.console import Console

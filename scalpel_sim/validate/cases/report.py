@@ -17,7 +17,7 @@ from scalpel_sim.validate.cases.runner import CaseRecord
 from scalpel_sim.validate.findings import FAIL, Check, Curve, Plot
 from scalpel_sim.validate.pictures import draw_plot
 from scalpel_sim.validate.report import bounds_text, value_text
-from tissue import whole_file
+from tissue.support import whole_file
 
 TABLE_FILE, SUMMARY_FILE = "case.csv", "case.json"
 
