@@ -66,14 +66,16 @@ def checked_steps(scene: str = "organ", /, *, no_audit: Flag = False) -> Benchma
     simulation.step()
     taken: dict[str, list[float]] = {"stages": [], "checks and a save": [], "checks, no save": []}
     watches = Stopwatches(time.thread_time_ns)
-    detach = watches.attach(("tissue.tissue:Tissue.step", "tissue.tissue:Tissue._advance"))
+    detach = watches.attach(
+        ("tissue.tissue:Tissue.step", "tissue.stepping.stages:StepStages.advance")
+    )
     try:
         for _ in range(round(simulation.duration / simulation.dt)):
             watches.spent.clear()
             simulation.step()
-            kind = "checks, no save" if tissue._step_log.inputs else "checks and a save"
+            kind = "checks, no save" if tissue._steps.inputs else "checks and a save"
             taken[kind].append(1e-9 * watches.spent["Tissue.step"])
-            taken["stages"].append(1e-9 * watches.spent["Tissue._advance"])
+            taken["stages"].append(1e-9 * watches.spent["StepStages.advance"])
     finally:
         detach()
     share = 100.0 * sum(map(sum, list(taken.values())[1:])) / sum(taken["stages"])

@@ -16,6 +16,7 @@ from tissue import (
     Tissue,
     block,
 )
+from tissue.blade.edge import NOWHERE
 from tissue.contact.response.forces import add_contact_forces, end_contact_substep
 from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
@@ -26,7 +27,6 @@ from tissue.integrators.options import Global
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
-from tissue.tissue import NOWHERE
 
 BlockCells = tuple[int, int, int]
 """Numbers of cells of a block along x, y and z."""
@@ -155,14 +155,14 @@ class EngineLoops:
         solver = SolverSettings(relaxation=Global(damping="step"), precision=precision)
         self._tissue = Tissue(mesh, material, fixed=held_nodes(mesh), solver=solver)
         if not is_averaged:
-            elasticity = self._tissue._system.elasticity
+            elasticity = self._tissue._model.elasticity
             plain = neo_hookean(material.mu, material.lam, averaged=False)
             arrays = elasticity.arrays
             elasticity.arrays = arrays.replaced(solid=arrays.solid.replaced(law=plain))
 
     def forces(self, n: int) -> None:
         """Evaluate the forces on all nodes, and the accelerations that follow."""
-        system = self._tissue._system
+        system = self._tissue._model
         # With the dampers among the forces; the engine's own steps let them act in between.
         damped = system.context.replaced(surroundings=system.surroundings)
         for _ in range(n):
@@ -177,12 +177,12 @@ class EngineLoops:
         body = self._tissue._body
         for _ in range(n):
             self.forces(1)
-            _kick_and_drift(body, self._tissue._system.stages.a1, FRAME_DT)
+            _kick_and_drift(body, self._tissue._model.stages.a1, FRAME_DT)
 
     def runge_kutta_steps(self, n: int) -> None:
         """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
         increment = Increment(NOWHERE, n * FRAME_DT, 0.0, 1.0)
-        self._stepper.take_steps(self._tissue._system, increment, n)
+        self._stepper.take_steps(self._tissue._model, increment, n)
 
     def frames(self, n: int) -> None:
         """Advance the body by whole frames, without a blade."""
@@ -192,13 +192,13 @@ class EngineLoops:
     @property
     def springs_per_node(self) -> list[int]:
         """Number of springs at each node."""
-        counts = self._tissue._system.elasticity.arrays.springs.count[: self._tissue.n_nodes]
+        counts = self._tissue._model.elasticity.arrays.springs.count[: self._tissue.n_nodes]
         return [int(count) for count in counts]
 
     @property
     def springs(self) -> tuple[IntArray, FloatArray]:
         """Nodes of each spring, shape (n_springs, 2), and stiffness [N/m], shape (n_springs,)."""
-        rows = self._tissue._system.elasticity.arrays.springs
+        rows = self._tissue._model.elasticity.arrays.springs
         node = np.repeat(np.arange(self._tissue.n_nodes), self.springs_per_node)
         within = np.concatenate([np.arange(n) for n in self.springs_per_node])
         slots = rows.first[node] + within
@@ -239,7 +239,7 @@ class TouchingBlocks:
 
     @property
     def _contact(self) -> SelfContact:
-        contact = self._tissue._system.contact
+        contact = self._tissue._model.contact
         assert isinstance(contact, SelfContact)
         return contact
 
@@ -261,14 +261,14 @@ class TouchingBlocks:
 
     def searches(self, n: int) -> None:
         """Find the contacts, as in every time step."""
-        system = self._tissue._system
+        system = self._tissue._model
         for _ in range(n):
             system.contact.begin()
             system.find_contacts(FRAME_DT)
 
     def forces(self, n: int) -> None:
         """Evaluate the forces of the contacts, and let them slide, as in every Verlet step."""
-        system, body, contacts = self._tissue._system, self._tissue._body, self._contact.forces
+        system, body, contacts = self._tissue._model, self._tissue._body, self._contact.forces
         x, v, external = body.positions, body.velocities, system.stages.external
         for _ in range(n):
             add_contact_forces(contacts, x, v, FRAME_DT, external)

@@ -67,13 +67,13 @@ TIMED_PARTS = (
     "scalpel_sim.arm.collision_monitor:CollisionMonitor.check",
     "bridge.bridge:Bridge.step",
     "tissue.tissue:Tissue.step",
-    "tissue.tissue:Tissue._begin_step",
-    "tissue.tissue:Tissue._relax",
+    "tissue.stepping.stages:StepStages._begin_step",
+    "tissue.stepping.stages:StepStages._relax",
     "tissue.integrators.global_stepper:GlobalStepper.relax",
-    "tissue.tissue:Tissue._detect",
+    "tissue.stepping.stages:StepStages._detect",
     "tissue.cutting.incision:Incision.detect",
-    "tissue.tissue:Tissue._result",
-    "tissue.energy_audit:Audit.energies",
+    "tissue.stepping.stages:StepStages._result",
+    "tissue.stepping.energy_audit:Audit.energies",
 )
 """Modules, and functions or methods in them."""
 

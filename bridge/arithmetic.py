@@ -134,7 +134,7 @@ PLAIN = Arithmetic(_Plain(axes_of), _Plain(motion_between), _Plain(energy_balanc
 @functools.cache
 def compiled_arithmetic() -> Arithmetic:
     """Return them compiled, for floats: a process with a tissue has loaded the compiler."""
-    from tissue import SameTypes, kernel
+    from tissue.support import SameTypes, kernel
 
     found = Arithmetic(
         SameTypes(kernel(axes_of)),

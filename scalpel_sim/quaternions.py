@@ -6,7 +6,7 @@ takes longer than all the arithmetic of a frame.
 
 import math
 
-from tissue import kernel
+from tissue.support import kernel
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

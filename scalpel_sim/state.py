@@ -14,7 +14,8 @@ from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.instruments.grip import Grip
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import Around, FloatArray, Memento, StateError, StateRules, TissueState
+from tissue import FloatArray, StateError, TissueState
+from tissue.support import Around, Memento, StateRules
 
 _SPEC = mujoco.mjtState.mjSTATE_INTEGRATION
 """State of MuJoCo that its next step depends on: joints, hand, wrenches, end of its solver."""

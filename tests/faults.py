@@ -22,7 +22,7 @@ def inject(tissue: Tissue, where: str, value: float, random: np.random.Generator
         value: In m, in m/s, or a factor.
         random: Chooses the number.
     """
-    body = tissue._system.body
+    body = tissue._model.body
     free = np.flatnonzero(~body.fixed[: body.n_nodes])
     if where == "stiffness":
         _spoil_stiffness(tissue, random.choice(free), value, random)
@@ -33,7 +33,7 @@ def inject(tissue: Tissue, where: str, value: float, random: np.random.Generator
 
 def _spoil_stiffness(tissue: Tissue, node: int, factor: float, random: np.random.Generator) -> None:
     """Multiply the stiffness of a spring of a node, or a gradient of a tetrahedron around it."""
-    elastic: Any = tissue._system.elasticity.arrays
+    elastic: Any = tissue._model.elasticity.arrays
     if elastic.has_springs:
         springs = elastic.springs
         slot = springs.first[node] + random.integers(springs.count[node])
@@ -41,7 +41,7 @@ def _spoil_stiffness(tissue: Tissue, node: int, factor: float, random: np.random
         return
     solid = elastic.solid
     width = 64 // solid.shape.itemsize
-    tetrahedra = tissue._system.body.tetrahedra[: tissue.n_tetrahedra]
+    tetrahedra = tissue._model.body.tetrahedra[: tissue.n_tetrahedra]
     t = random.choice(np.flatnonzero((tetrahedra == node).any(axis=1)))
     rows = solid.shape.reshape(-1)[10 * width * (t // width) :][: 10 * width].reshape(10, width)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,28 +1,24 @@
 """Cuts of a moving, deformed body, with every invariant checked after each of them."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tests import incisions, soundness, strokes
 from tests.incisions import Incision
 from tissue import FloatArray, Snapshot, TetrahedralMesh, Tissue
+from tissue.body_view import snapshot_of
+from tissue.stepping.stages import StepStages
 
 
-class WatchedTissue(Tissue):
-    """A tissue that records how much its cuts change the momentum.
-
-    Forces act only between cuts, so a cut itself must not change the momentum.
-    """
+class _WatchedStages(StepStages):
+    """Stages that record how much their cuts change the momentum."""
 
     momentum_jump = 0.0
-    """Largest change in any cut step, relative to the sum of mass times speed."""
-
     n_watched = 0
-    """Number of cut steps so far."""
 
     def _before_cut(self) -> None:
-        self._before = self.snapshot()
+        self._before = snapshot_of(self.model.body)
         super()._before_cut()
 
     def _after_cut(self) -> None:
@@ -31,8 +27,31 @@ class WatchedTissue(Tissue):
         self.n_watched += 1
         scale = float(before.masses @ np.linalg.norm(before.velocities, axis=1))
         if scale > 0.0:
-            jump = soundness.momentum(self.snapshot()) - soundness.momentum(before)
+            jump = soundness.momentum(snapshot_of(self.model.body)) - soundness.momentum(before)
             self.momentum_jump = max(self.momentum_jump, float(np.abs(jump).max()) / scale)
+
+
+class WatchedTissue(Tissue):
+    """A tissue that records how much its cuts change the momentum.
+
+    Forces act only between cuts, so a cut itself must not change the momentum.
+    """
+
+    _stages: _WatchedStages
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._stages.__class__ = _WatchedStages
+
+    @property
+    def momentum_jump(self) -> float:
+        """Largest change in any cut step, relative to the sum of mass times speed."""
+        return self._stages.momentum_jump
+
+    @property
+    def n_watched(self) -> int:
+        """Number of cut steps so far."""
+        return self._stages.n_watched
 
 
 class Verdict(NamedTuple):

@@ -76,7 +76,7 @@ def test_a_free_undamped_body_keeps_its_energy():
     def energy():
         body = tissue.snapshot()
         kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-        return kinetic + elastic_energy(tissue._system.elasticity.arrays, tissue._body)
+        return kinetic + elastic_energy(tissue._model.elasticity.arrays, tissue._body)
 
     before = energy()
     for _ in range(500):
@@ -263,7 +263,7 @@ def test_the_work_of_the_blade_goes_into_cutting_stored_energy_and_damping(tough
     tissue, _, results = steady_cut((6, 12, 3), toughness, 0.1)
     body = tissue.snapshot()
     stored = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-    stored += elastic_energy(tissue._system.elasticity.arrays, tissue._body)
+    stored += elastic_energy(tissue._model.elasticity.arrays, tissue._body)
     last = results[-1]
     assert last.work_of_cutting > 0.0
     assert last.work_of_cutting <= last.work_of_blade
@@ -288,7 +288,7 @@ def test_rows_and_masses_after_cuts_are_those_built_from_scratch():
     strokes.make(tissue, strokes.slanted(mesh))
     strokes.make(tissue, strokes.straight(mesh, 0.3))
     body, n = tissue._body, tissue.n_nodes
-    kept = [row(tissue._system.elasticity.arrays.springs, i) for i in range(n)]
+    kept = [row(tissue._model.elasticity.arrays.springs, i) for i in range(n)]
     masses = body.masses[:n].copy()
     from_scratch = springs_of(body, tissue.material.young_modulus)
     assert kept == [row(from_scratch, i) for i in range(n)]

@@ -61,7 +61,7 @@ def test_what_is_no_longer_found_lets_go_little_by_little():
     assert 0.6 * before < forces[0] < before
     assert np.all(np.diff(forces) <= 0.0)
     assert forces[-1] == 0.0
-    assert tissue._system.contact.forces.n_contacts == 0
+    assert tissue._model.contact.forces.n_contacts == 0
 
 
 def test_what_is_found_again_goes_on_with_the_force_that_fades():
@@ -73,7 +73,7 @@ def test_what_is_found_again_goes_on_with_the_force_that_fades():
     lift(tissue, -ELEMENT)
     for _ in range(2):
         assert tissue.step(None, strokes.DT).body_contacts.force > 0.4 * before
-    assert tissue._system.contact.forces.n_fading == 0
+    assert tissue._model.contact.forces.n_fading == 0
 
 
 def advance(tissue: Tissue, duration: float, every: int = 50) -> float:
@@ -322,7 +322,7 @@ def test_a_cut_body_neither_gains_energy_nor_creeps_as_it_rests_in_motion(gravit
     def after(seconds):
         """Return the energy stored, the residual and the loss in contact [J], and positions."""
         for _ in range(round(seconds / strokes.DT)):
-            tissue._global_stepper.wake()
+            tissue._stages.global_stepper.wake()
             energies = tissue.step(None, strokes.DT).energies
         stored = energies.elastic + energies.kinetic + energies.potential + energies.held
         return (stored, energies.residual, energies.contact), tissue.snapshot().positions

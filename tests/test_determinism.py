@@ -54,7 +54,7 @@ def test_arrays_that_grow_change_nothing():
         n_nodes, n_tetrahedra = ample._body.n_nodes, ample._body.n_tetrahedra
         ample._body.n_nodes = len(ample._body.rest)
         ample._body.n_tetrahedra = len(ample._body.tetrahedra)
-        ample._make_room()
+        ample._stages.make_room()
         ample._body.n_nodes, ample._body.n_tetrahedra = n_nodes, n_tetrahedra
     assert len(ample._body.rest) > 4 * len(Tissue(mesh)._body.rest)
     assert fingerprint(ample, strokes.make(ample, stroke)) == expected

@@ -23,7 +23,7 @@ from tissue import (
     Tissue,
     block,
 )
-from tissue.energy_audit import MeshChanges
+from tissue.stepping.energy_audit import MeshChanges
 
 SIZE = (0.04, 0.04, 0.02)
 N_STROKES = 5
@@ -79,7 +79,7 @@ def account_of(law, relaxation):
         poses = itertools.pairwise(random_stroke(tissue, random))
         for sweep in (*itertools.starmap(BladeSweep, poses), *[None] * AFTER):
             energies.append(tissue.step(sweep, STROKE_DT).energies)
-            changes.append(tissue._audit.changes)
+            changes.append(tissue._stages.audit.changes)
         strokes.append(energies[-1])
     return Account(
         springs,

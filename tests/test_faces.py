@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-PACKAGES = ("tissue", "bridge", "scalpel_sim")
+PACKAGES = ("tissue", "tissue.support", "bridge", "scalpel_sim")
 HEAVY = ("numba", "llvmlite", "mujoco", "matplotlib", "trimesh", "fcl")
 
 

@@ -261,13 +261,13 @@ def test_18_no_altitude_falls_below_the_guard_and_the_frequency_grows_6_times_in
     for seed in range(20):
         mesh = MESHES[mesh_kind](seed)
         tissue = at_rest(mesh)
-        before = tissue._system.elasticity.frequency_squared
+        before = tissue._model.elasticity.frequency_squared
         for i in range(5):
             tissue.incise(*incisions.incision(mesh, list(incisions.KINDS)[i], 10 * seed + i))
         after = tissue.snapshot()
         altitude = soundness.smallest_altitude(after.rest_positions, after.tetrahedra)
         assert altitude >= (1.0 - 1e-9) * CutSettings().guard * tissue.node_size
-        growth.append(np.sqrt(tissue._system.elasticity.frequency_squared / before))
+        growth.append(np.sqrt(tissue._model.elasticity.frequency_squared / before))
     assert np.median(growth) <= 6.0
     assert max(growth) <= 8.0
 

@@ -189,8 +189,8 @@ def test_the_cut_advances_to_a_blade_that_rests(mesh):
     arrives = along_y(-0.01, 0.0262)
     area_at_arrival = strokes.make(tissue, arrives)[-1].cut_area
     area_after_rest = strokes.make(tissue, [arrives[-1]] * 400)[-1].cut_area
-    in_tissue = tissue._incision.path.t1[
-        tissue._incision.path.member
+    in_tissue = tissue._stages.incision.path.t1[
+        tissue._stages.incision.path.member
     ]  # in the rest shape, where it lags behind the blade
     swept = float(np.trapezoid(in_tissue[:, 1].clip(0.0), in_tissue[:, 2].clip(0.0, EDGE)))
     assert area_at_arrival < 0.9 * swept

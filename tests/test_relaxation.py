@@ -118,7 +118,7 @@ def test_arrays_that_grow_change_nothing(relaxation):
             n_nodes, n_tetrahedra = tissue._body.n_nodes, tissue._body.n_tetrahedra
             tissue._body.n_nodes = len(tissue._body.rest)
             tissue._body.n_tetrahedra = len(tissue._body.tetrahedra)
-            tissue._make_room()
+            tissue._stages.make_room()
             tissue._body.n_nodes, tissue._body.n_tetrahedra = n_nodes, n_tetrahedra
         fingerprints.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
     assert fingerprints[0] == fingerprints[1]

@@ -14,7 +14,6 @@ from tissue import (
     Tissue,
     TissueError,
 )
-from tissue.loads.step_inputs import inputs_of
 
 MESH = bodies.jittered(4, 0)
 STROKE = list(strokes.sweeps(strokes.THROUGH["slanted"](MESH)))
@@ -67,10 +66,9 @@ def test_going_back_by_steps_gives_the_same_bits_whatever_drives_the_body(last):
         for each in (spoiled, other):
             each.drive(i)
         if i == last:
-            what = (tissue._loads, tissue._attachments, tissue._system)
-            inputs = inputs_of(STROKE[MIDDLE + i], strokes.DT, *what)
+            inputs = tissue._stages.handles.inputs(STROKE[MIDDLE + i], strokes.DT)
             tissue._body.positions[7] = tissue._body.velocities[9] = np.nan
-            tissue._go_back(inputs)
+            tissue._steps.go_back(inputs)
         for each in (spoiled, other):
             each.tissue.step(STROKE[MIDDLE + i], strokes.DT)
     assert same(tissue, other.tissue)
@@ -80,10 +78,9 @@ def test_going_back_to_before_a_line_touched_the_body_loses_no_step():
     spoiled, other = (Tissue(MESH, SOLID, fixed=bodies.sides(MESH)) for _ in range(2))
     for i, sweep in enumerate(STROKE[:MIDDLE]):
         if i == 3:
-            spoiled._save_step()  # as after so many steps
+            spoiled._steps.save()  # as after so many steps
         if i % 50 == 49:
-            what = (spoiled._loads, spoiled._attachments, spoiled._system)
-            spoiled._go_back(inputs_of(sweep, strokes.DT, *what))
+            spoiled._steps.go_back(spoiled._stages.handles.inputs(sweep, strokes.DT))
         results = [tissue.step(sweep, strokes.DT) for tissue in (spoiled, other)]
     assert results[0].cut_area == results[1].cut_area > 0.0
     assert same(spoiled, other)
@@ -166,7 +163,7 @@ def test_nodes_that_move_faster_than_their_energy_allows_are_found():
 
 def test_a_node_that_leaves_the_box_faster_than_nodes_move_is_named():
     tissue = in_mid_cut()
-    watch, system = tissue._watch, tissue._system
+    watch, system = tissue._steps.watch, tissue._model
     watch.look(system)
     assert watch.fault(system, strokes.DT, 0.0, 0.0, 0.0) is None
     tissue._body.positions[5, 0] = TOP[0] + 1.0

@@ -49,6 +49,6 @@ def test_an_arm_that_falls_on_another_of_the_same_piece_stays_on_it(gap, relaxat
 def test_edges_of_one_piece_are_not_tested_against_each_other():
     """A limit: docs/contact.md names it. Nodes hold the arm here."""
     tissue, _ = fallen(0.012, SolverSettings())
-    contact = tissue._system.contact
+    contact = tissue._model.contact
     assert contact.forces.n_pressing > 5
     assert contact._search.edge_pairs.n_pairs == 0

@@ -237,7 +237,7 @@ def test_a_state_is_loaded_from_before_arrays_have_grown():
     expected = step(tissue, AFTER)
     tissue.load_state(state)
     body.n_nodes, n_nodes = len(body.rest), body.n_nodes  # they appear full
-    tissue._make_room()
+    tissue._stages.make_room()
     tissue._body.n_nodes = n_nodes
     assert len(tissue._body.rest) > len(body.rest)
     assert step(tissue, AFTER) == expected

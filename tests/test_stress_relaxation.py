@@ -9,7 +9,7 @@ import pytest
 from tests import bodies, strokes
 from tests.tissue.solids import evaluate
 from tissue import MATERIALS, Material, SolverSettings, TetrahedralMesh, Tissue, block, liver_lobe
-from tissue.tissue import NOWHERE
+from tissue.blade.edge import NOWHERE
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 PRONY = ((0.3, 0.1), (0.2, 2.0))
@@ -30,7 +30,7 @@ def kept(seconds):
 def forces(tissue):
     """Return the forces of the tetrahedra on the nodes [N]."""
     body, out = tissue._body, np.zeros((tissue.n_nodes, 3))
-    evaluate(tissue._system.elasticity.arrays.solid, body, body.positions, out)
+    evaluate(tissue._model.elasticity.arrays.solid, body, body.positions, out)
     return out
 
 
@@ -146,7 +146,7 @@ def test_a_cut_leaves_the_stress_that_has_relaxed(scheme):
     tissue.incise(edges, (0.0, 1.0, 0.0))
     assert tissue.n_tetrahedra > n + 100
     assert tissue.n_pieces() == 2
-    solid = tissue._system.elasticity.arrays.solid
+    solid = tissue._model.elasticity.arrays.solid
     relaxed = solid.relaxed.reshape(-1, 7, 8).transpose(0, 2, 1).reshape(-1, 7)
     found = relaxed[: tissue.n_tetrahedra]
     largest = np.abs(found[0]).max()
@@ -220,7 +220,7 @@ def test_the_account_of_a_body_that_swings_closes():
         gravity=NO_GRAVITY,
         solver=SolverSettings(audit=True),
     )
-    at_first, before = tissue._audit._at_first[0], 0.0
+    at_first, before = tissue._stages.audit._at_first[0], 0.0
     for _ in range(3000):
         now = tissue.step(None, 1e-4).energies
         assert now.damping > before
@@ -240,7 +240,7 @@ def test_the_account_tells_what_maxwell_elements_dissipate():
         gravity=NO_GRAVITY,
         solver=SolverSettings(audit=True),
     )
-    stored, before = tissue._audit._at_first[0], 0.0
+    stored, before = tissue._stages.audit._at_first[0], 0.0
     for _ in range(100):
         now = tissue.step(None, 0.1).energies
         assert now.damping > before
@@ -258,7 +258,7 @@ def test_the_same_bits_on_one_and_two_threads():
         solver = SolverSettings(threads=threads, audit=True)
         tissue = Tissue(mesh, SOFT, fixed=bodies.sides(mesh), solver=solver)
         strokes.make(tissue, strokes.slanted(mesh))
-        found.append((tissue.snapshot(), tissue._system.damping.dissipated))
+        found.append((tissue.snapshot(), tissue._model.damping.dissipated))
     for one, two in zip(found[0][0], found[1][0], strict=True):
         np.testing.assert_array_equal(one, two)
     assert found[0][1] == found[1][1]
@@ -266,7 +266,7 @@ def test_the_same_bits_on_one_and_two_threads():
 
 def test_without_a_series_nothing_is_kept():
     elastic = Material(law="neo_hookean", poisson_ratio=0.45)
-    solid = Tissue(block((2, 2, 2)), elastic)._system.elasticity.arrays.solid
+    solid = Tissue(block((2, 2, 2)), elastic)._model.elasticity.arrays.solid
     assert len(solid.relaxed) == len(solid.relaxed_terms) == 0
 
 
@@ -284,9 +284,9 @@ def test_a_body_pressed_flat_and_let_go_comes_to_rest():
         gravity=NO_GRAVITY,
         solver=SolverSettings(audit=True),
     )
-    tissue._system.relax_stress(math.inf)
-    tissue._audit.begin(tissue._system, NOWHERE)
-    at_first = tissue._audit._at_first[0]
+    tissue._model.relax_stress(math.inf)
+    tissue._stages.audit.begin(tissue._model, NOWHERE)
+    at_first = tissue._stages.audit._at_first[0]
     for _ in range(500):
         energies = tissue.step(None, 1e-3).energies
     assert abs(energies.residual) < 0.01 * at_first

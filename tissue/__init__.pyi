@@ -1,4 +1,5 @@
 from .blade.toughness import ToughnessLaw as ToughnessLaw
+from .blade.toughness import expect_toughness_in_range as expect_toughness_in_range
 from .blade.toughness import toughness_law_of as toughness_law_of
 from .blade_shape import BladeShape as BladeShape
 from .boundary_conditions import fixed_nodes as fixed_nodes
@@ -8,17 +9,10 @@ from .contact.geoms.geom_contact import GeomContact as GeomContact
 from .core.array_types import BoolArray as BoolArray
 from .core.array_types import FloatArray as FloatArray
 from .core.array_types import IntArray as IntArray
-from .core.cache_directory import cache_directory as cache_directory
-from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
-from .core.jit import SameTypes as SameTypes
-from .core.jit import is_compiling as is_compiling
-from .core.jit import kernel as kernel
 from .core.limits import LARGEST_COORDINATE as LARGEST_COORDINATE
 from .core.limits import LARGEST_STRENGTH as LARGEST_STRENGTH
 from .core.limits import MANY_SUBSTEPS as MANY_SUBSTEPS
 from .core.limits import MOST_SUBSTEPS as MOST_SUBSTEPS
-from .core.memento import Memento as Memento
-from .core.memento import StateRules as StateRules
 from .core.memento_reading import StateError as StateError
 from .core.three_vectors import BladeSegment as BladeSegment
 from .core.three_vectors import BladeSweep as BladeSweep
@@ -29,18 +23,13 @@ from .cut_settings import MeshMeasures as MeshMeasures
 from .elasticity.spring_calibration import SpringError as SpringError
 from .elasticity.spring_calibration import calibrated as calibrated
 from .elasticity.spring_calibration import spring_error as spring_error
-from .geometry.connected_components import components as components
 from .geometry.rotations import are_rotations as are_rotations
 from .geometry.rotations import checked_rotation as checked_rotation
-from .input_checks import expect_toughness_in_range as expect_toughness_in_range
 from .integrators.options import Global as Global
 from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
-from .io.whole_file import new_whole_file as new_whole_file
-from .io.whole_file import remove_unfinished as remove_unfinished
-from .io.whole_file import whole_file as whole_file
 from .loads.attachment import Attachment as Attachment
 from .loads.frame_path import FramePath as FramePath
 from .loads.ligament import Ligament as Ligament
@@ -60,7 +49,6 @@ from .shapes.cylinder import cylinder as cylinder
 from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
-from .state.tissue_state import Around as Around
 from .state.tissue_state import TissueState as TissueState
 from .tissue import Tissue as Tissue
 from .types import CUT_COLOUR as CUT_COLOUR
@@ -80,7 +68,6 @@ from .types import TetrahedralMesh as TetrahedralMesh
 from .types import TissueError as TissueError
 
 __all__ = [
-    "Around",
     "BladeSegment",
     "BladeShape",
     "BladeSweep",
@@ -111,13 +98,11 @@ __all__ = [
     "MOST_SUBSTEPS",
     "Material",
     "MaterialPoints",
-    "Memento",
     "MeshError",
     "MeshMeasures",
     "Piece",
     "Preset",
     "SKIN_COLOUR",
-    "SameTypes",
     "RigidContacts",
     "SchemeStatistics",
     "Snapshot",
@@ -126,7 +111,6 @@ __all__ = [
     "SpringError",
     "StageTimes",
     "StateError",
-    "StateRules",
     "StepResult",
     "Surface",
     "SurfaceQuantity",
@@ -139,24 +123,16 @@ __all__ = [
     "are_rotations",
     "block",
     "boundary_faces",
-    "cache_directory",
     "calibrated",
     "checked_rotation",
-    "components",
     "cylinder",
     "expect_toughness_in_range",
     "fixed_nodes",
-    "is_compiling",
-    "kernel",
     "lattice_block",
     "liver_lobe",
-    "n_compiled_kernels",
-    "new_whole_file",
     "pieces_of",
     "read_mesh",
-    "remove_unfinished",
     "spring_error",
     "toughness_law_of",
-    "whole_file",
     "write_vtu",
 ]

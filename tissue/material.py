@@ -1,5 +1,6 @@
 """The material of the tissue, in quantities that can be measured."""
 
+import logging
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
@@ -34,6 +35,8 @@ decades of time is fitted by three."""
 SHORTEST_RELAXATION = 0.01
 """Shortest time constant of a Prony series [s]: ten steps of 1 ms, which resolve it. Damping is for
 what is faster."""
+
+_log = logging.getLogger("tissue")
 
 
 @dataclass(frozen=True)
@@ -296,3 +299,16 @@ def checked_series(series: Iterable[Iterable[float]]) -> tuple[tuple[float, floa
             "left at last"
         )
     return pairs
+
+
+def warn_of_ratio(material: Material) -> None:
+    """Log a warning if the resistance to compression makes time steps very short."""
+    ratio = material.poisson_ratio
+    if ratio > NEARLY_INCOMPRESSIBLE:
+        _log.warning(
+            "poisson_ratio is %g: time steps are %.3g times shorter than at 0.45, because waves of "
+            "compression are that much faster. 0.45 to 0.49 is as incompressible as a soft body "
+            "looks",
+            ratio,
+            material.wave_speed / replace(material, poisson_ratio=0.45).wave_speed,
+        )

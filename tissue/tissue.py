@@ -1,85 +1,60 @@
-"""A tetrahedral body that a blade can cut: `Tissue._advance` lists the stages of a step."""
+"""`Tissue`: a tetrahedral body that a blade can cut."""
 
+import math
 from collections.abc import Sequence
-from time import perf_counter
 
-import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.blade_context import NOT_ENGAGED, BladeContext
-from tissue.blade.edge import Edge
-from tissue.blade.lazy_result import LazyResult
-from tissue.blade.path_tracing import forget_path
-from tissue.blade.prescribed_cut import cut_along
+from tissue.blade.prescribed_cut import checked_edges
 from tissue.blade_shape import BladeShape
-from tissue.core.array_types import BoolArray, FloatArray
+from tissue.body_view import bounds_of_body, n_pieces_of, snapshot_of, surface_values_of
+from tissue.contact.geoms.geom import Geom
+from tissue.contact.geoms.geom_contact import GeomContact
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.memento import Spares
 from tissue.core.three_vectors import BladeSweep
-from tissue.core.vec3 import Vec3
 from tissue.cut_settings import CutReport
-from tissue.cutting.incision import CutHooks, Incision
-from tissue.cutting.scheme_choice import scheme_of
-from tissue.cutting.snapping import EXPLAINED
-from tissue.elasticity.internal_forces import Surroundings
-from tissue.energy_audit import Audit
-from tissue.input_checks import (
-    checked_edges,
-    checked_fixed,
-    checked_floor,
-    checked_gravity,
-    checked_positions,
-    checked_solver,
-    checked_time_step,
-    edge_of,
-    edge_or_error,
-    expect_toughness_in_range,
-    warn_of_ratio,
-    warn_of_toughness,
-)
-from tissue.integrators.equilibrium import SETTLED, settle
-from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
-from tissue.integrators.global_stepper import GlobalStepper, method_of
-from tissue.integrators.integrator import integrator_of
-from tissue.integrators.options import Hierarchical
-from tissue.integrators.step_context import Increment
-from tissue.integrators.step_length import expect_few_steps
-from tissue.integrators.system import Numerics, assembled
-from tissue.loads.attachment_list import AttachmentList
-from tissue.loads.load import Loads
+from tissue.loads.attachment import Attachment
+from tissue.loads.ligament import Ligament, ends_of_strands
+from tissue.loads.load import Load
+from tissue.loads.material_points import MaterialPoints, points_of
 from tissue.material import Material
-from tissue.mesh.body import Body, build_body
-from tissue.mesh.bounding_boxes import write_bounds
-from tissue.mesh.changes import touched_nodes
-from tissue.mesh.cut_error import path_error
-from tissue.mesh.star import Visits
-from tissue.mesh.validation import expect_sound
-from tissue.mesh.workspace import room_for_a_pass
+from tissue.mesh.body import Body
+from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
+from tissue.mesh.surface import boundary_surface
 from tissue.solver_settings import SolverSettings
-from tissue.state.repeated_steps import RepeatedSteps
-from tissue.types import SchemeStatistics, StageTimes, StepResult, TetrahedralMesh
+from tissue.state.identity import Identity
+from tissue.state.tissue_state import Around, TissueState
+from tissue.stepping.assembly import assembled
+from tissue.stepping.checked_steps import CheckedSteps
+from tissue.types import (
+    Chunks,
+    Piece,
+    SchemeStatistics,
+    Snapshot,
+    StepResult,
+    Surface,
+    SurfaceQuantity,
+    TetrahedralMesh,
+)
 
-NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
-"""The edge of no blade."""
 
-
-class Tissue(RepeatedSteps):
+class Tissue:
     """A soft body of tetrahedra: masses at nodes, a material between them, a blade that cuts it.
 
     Args:
         mesh: The body at rest.
         material: What it is made of.
-        fixed: The supports: nodes that do not move, or move as `move_supports` says, shape
-            (n_nodes,).
+        fixed: The supports, which stay or move as `move_supports` says, shape (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
         gravity: Acceleration of free fall [m/s2].
         floor: Height of a floor, for example a table, below the body [m]; None for no floor.
-        blade: The body of the blade, whose faces part the tissue and rub on it; None for the
-            paper's blade, a line that cuts.
+        blade: Body of the blade, whose faces part and rub the tissue; None: a line (the paper).
         solver: How the body is cut and moved.
 
     Raises:
-        MeshError: the mesh is broken, or would have to be repaired
-            (`tissue.mesh.validation.checked`).
+        MeshError: the mesh is broken or needs repair (`tissue.mesh.validation.checked`).
         ValueError: another argument does not fit the mesh, or is not finite.
     """
 
@@ -95,301 +70,331 @@ class Tissue(RepeatedSteps):
         blade: BladeShape | None = None,
         solver: SolverSettings = SolverSettings(),
     ) -> None:
-        mesh = expect_sound(mesh)
         self.material = material or Material()
-        self.blade = blade
-        self.floor = floor
-        self.solver = solver
-        options = checked_solver(solver, self.material)
-        surroundings = Surroundings(
-            gravity=checked_gravity(gravity),
-            drag=float(self.material.viscous_damping),
-            retardation_time=float(self.material.retardation_time),
-        )
-        body = build_body(
-            mesh,
-            checked_positions(positions, mesh.positions),
-            checked_fixed(fixed, len(mesh.positions)),
-        )
-        if solver.scheme == "paper":
-            from tissue.cutting.bielser_1998.mesh_records import with_room_to_hang
+        self.blade, self.floor, self.solver = blade, floor, solver
+        settings = (self.material, blade, floor, solver)
+        self._stages = assembled(mesh, fixed, positions, gravity, *settings)
+        self._steps = CheckedSteps(self._stages)
+        self._model = model = self._stages.model
+        self.node_size = model.node_size
+        """Mean node size of the body before any cut [m]."""
+        self._identity = Identity.of(model.body, model.surroundings.gravity, *settings)
+        self._spares = Spares()
 
-            body = with_room_to_hang(body)
-        method = method_of(options, self.material.law)
-        single = solver.precision == "single"
-        together = not isinstance(options, Hierarchical)
-        how = Numerics(solver.mass_scaling, method.damps_between_steps, single, together)
-        self._system = assembled(body, self.material, surroundings, blade, floor, how)
-        self.node_size = self._system.node_size
-        warn_of_toughness(self.material, self.node_size)
-        warn_of_ratio(self.material)
-        checked_floor(floor, float(self.bounds[0, 2]), options)
-        scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
-        self._incision = Incision(scheme, self.node_size)
-        self._system.find_loose_pieces()
-        self._loads = Loads()
-        self._attachments = AttachmentList()
-        self._audit = Audit(is_kept=solver.audit)
-        self._global_stepper = GlobalStepper(method, solver.threads)
-        self._at_first = self._system.measures(method.limit)
-        self._integrator = integrator_of(options, self._global_stepper, len(body.rest))
-        self._bounds = self.bounds
-        self._slit_reach = EXPLAINED * solver.cut.floor * self.node_size
-        self._edge_now = (NOWHERE, 1.0)
-        self._touched = np.zeros(len(body.rest), dtype=np.int64)
-        self._make_room()
-        self._audit.begin(self._system, NOWHERE)
-        self._begin_state()
+    @property
+    def _body(self) -> Body:
+        return self._model.body
 
-    def _advance(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Do the stages of `step`."""
-        has_blade = sweep is not None
-        edge = NOWHERE if sweep is None else edge_of(sweep)
-        dt = checked_time_step(dt)
-        expect_few_steps(self._system, self._global_stepper.method.limit, dt)
-        interaction, incision = self._system.interaction, self._incision
-        travel = edge.travel if has_blade else 0.0
-        n = incision.n_increments(travel)
-        self._begin_step(sweep, edge, dt)
-        self._begin_hold(dt)
-        n = max(n, self._system.geoms.n_increments) * self._global_stepper.refinement
-        n_substeps = 0
-        collision = topology = relaxation = 0.0  # wall times
-        now = perf_counter()
-        for i in range(n):
-            increment, begun = Increment(edge, dt, i / n, (i + 1) / n), now
-            # RX, relaxation: forces, contact, motion, slip of the blade
-            n_substeps += self._relax(increment, has_blade)
-            relaxed = perf_counter()
-            # CD, collision detection: path, active tetrahedra, crossed edges
-            is_crossed = has_blade and self._detect(increment)
-            detected = perf_counter()
-            # GC, geometric changes: subdivision, separation
-            if is_crossed:
-                incision.cut(self._hooks)
-            elif has_blade and not interaction.is_engaged:
-                self._end_incision()
-            now = perf_counter()
-            relaxation += relaxed - begun
-            collision += detected - relaxed
-            topology += now - detected
-        if has_blade and incision.has_rested(travel, dt):
-            incision.open_to_edge(self._hooks)
-            topology += perf_counter() - now
-        stage_times = StageTimes(collision, topology, relaxation)
-        self._end_hold(dt)
-        return self._result(edge, has_blade, dt, n_substeps, stage_times)
+    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+        """Advance the body by `dt` [s] while the blade does `sweep`.
+
+        A step is accepted if all positions and velocities are finite, no node leaves the box around
+        the body faster than nodes move, and the nodes have no more energy than they were given.
+        Otherwise it is done again in shorter steps of the integrator, up to three times. If that
+        fails, the body stays as it was before, and can only be read until `load_state`.
+
+        Args:
+            sweep: Motion of the cutting edge, or None where no blade is near.
+            dt: Length of the step [s]. It is divided as stability and the speed of the blade need.
+
+        Raises:
+            ValueError: the blade has no length or does not fit the mesh, or a number is not finite.
+            TissueError: the motion of the tissue became unstable, now or before; it names nodes.
+        """
+        return self._steps.step(sweep, dt)
+
+    @property
+    def n_repeated_steps(self) -> int:
+        """Number of steps that went wrong, and were done again in shorter ones."""
+        return self._steps.n_repeated
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
-        """Cut along a given surface in the body at rest: no blade, no force, no time passes.
+        """Cut along a given surface in the body at rest; return the area of one side [m2].
 
-        For tissue that was cut before the scene begins, and for cuts that must be where they are
-        told. The surface is ruled: the edge goes in straight lines from each of its places to the
-        next. As with a blade only its front cuts; where a point of it goes back, it cuts nothing
-        until it is ahead of where it has been.
+        There is no blade and no force, and no time passes: for tissue that was cut before. The edge
+        goes in straight lines from place to place. As with a blade only its front cuts: a point
+        that goes back cuts nothing until it is ahead of where it has been.
 
         Args:
             edges: Places of the cutting edge in the body at rest [m], from tip to heel, shape
                 (n_places, n_points, 3), at least two of each.
-            forward: Direction in which the edge faces in each place, shape (n_places, 3); or in
-                all of them, (3,).
-
-        Returns:
-            Area of the faces cut [m2], one side of each.
+            forward: Direction in which the edge faces, shape (3,); or in each place, (n_places, 3).
 
         Raises:
             ValueError: an array has another shape, is not finite, or an edge faces along itself.
         """
         rows, directions = checked_edges(edges, forward)
-        self._begin_change()
-        return self._with_room(lambda: self._cut_along(rows, directions))
-
-    def _cut_along(self, rows: FloatArray, directions: FloatArray) -> float:
-        """Cut along a surface that was checked; return the area cut [m2]."""
-        self._end_incision()
-        incision, blade_path = self._incision, self._incision.path
-        before = incision.cut_area
-        cut_along(incision, self._hooks, rows, directions, self.node_size)
-        self._end_incision()
-        incision.path = blade_path
-        return incision.cut_area - before
+        self._steps.begin_change()
+        return self._steps.with_room(lambda: self._stages.cut_along(rows, directions))
 
     def settle(self) -> int:
         """Relax to equilibrium under gravity, loads and supports; return the steps it took.
 
-        Dynamic relaxation (`tissue.integrators.equilibrium`): all nodes are moved together,
-        whatever the integrator. Stress that relaxes (`Material.prony`) has relaxed wholly: this is
-        where the body comes to rest at last. A body that still moves a little gets a warning.
+        Dynamic relaxation of all nodes together (`tissue.integrators.equilibrium`). Stress that
+        relaxes (`Material.prony`) has relaxed wholly. A body that still moves gets a warning.
 
         Raises:
             TissueError: nothing holds the body, or a piece of it, against its weight and its loads,
                 its motion became unstable, or it does not come to rest. It is then where it was.
         """
-        self._begin_change()
-        self._with_room(lambda: self._take_edge(None))
-        system = self._system
-        self._loads.spread(system.body, system.stages.loads)
-        self._attachments.stop(system.body)
-        system.geoms.stop()
-        support = support_of(system, self.material, self.floor)
-        found = settle(self._global_stepper, system, NOWHERE, support)
-        self._integrator.body_moved(system.body)
-        if found.is_at_rest:
-            self._global_stepper.let_rest(system)
-        else:
-            warn_of_motion(system, found.n_steps, found.accelerations, support, SETTLED)
-        write_bounds(system.body, self._bounds)
-        self._audit.begin(self._system, NOWHERE)
-        return found.n_steps
+        self._steps.begin_change()
+        self._steps.with_room(lambda: self._stages.take_edge(None))
+        return self._stages.settle(self.floor)
+
+    def material_points(self, where: str | npt.ArrayLike) -> MaterialPoints:
+        """Return points of the material, which move with it and survive cuts.
+
+        Args:
+            where: A region as text (`fixed_nodes`) or as a mask of nodes, shape (n_nodes,): the
+                centroids of the faces of the skin in it, each with its share of their area; or
+                numbers of nodes, shape (n,); or places in the body at rest [m], shape (n, 3).
+
+        Raises:
+            ValueError: no point is there, or one is outside the body.
+        """
+        return points_of(self._body, where)
+
+    def positions_of(self, points: MaterialPoints) -> FloatArray:
+        """Return where material points are now [m], shape (n, 3)."""
+        return points.positions(self._body)
+
+    def push(self, where: str | npt.ArrayLike | MaterialPoints, force: npt.ArrayLike) -> Load:
+        """Push material points with a force, until `release`; return the load.
+
+        Its force can be changed between steps (`Load.force`); frozen nodes do not feel it
+        (`Hierarchical(far="frozen")`). Its work is in the account of energy.
+
+        Args:
+            where: Material points, or what `material_points` takes. On a region the force is a
+                traction, the same on each area of the skin at rest.
+            force: Total force [N], shape (3,); or one on each point, shape (n, 3).
+
+        Raises:
+            ValueError: no point is there or one is outside the body; a force that `Load` refuses.
+        """
+        points = where if isinstance(where, MaterialPoints) else self.material_points(where)
+        return self._steps.begin_change().handles.push(Load(points, force))
+
+    def attach(
+        self,
+        where: str | npt.ArrayLike | MaterialPoints,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        rest_length: float = 0.0,
+        breaks_at: float = math.inf,
+        origin: Sequence[float] | None = None,
+    ) -> Attachment:
+        """Tie points of the tissue by springs to a frame that is moved from outside; return it.
+
+        The frame stays where it is until `Attachment.move`: an attachment to the world. Each side
+        of a cut through its points keeps its own. Its work is in the account of energy.
+
+        Args:
+            where: Points as `push` takes them, but of a region its nodes, inside the body as well.
+            stiffness: Of all springs together [N/m].
+            damping: Of all dampers together [N s/m].
+            rest_length: Length up to which each point is slack, in any direction [m].
+            breaks_at: Force at which the attachment releases the tissue [N].
+            origin: Origin of the frame, and of torques on it [m]; None: the mean of the points.
+
+        Raises:
+            ValueError: no point is there, one is outside the body, a number is not finite or has
+                the wrong sign, or the relaxation is `hierarchical`, which has no attachments.
+        """
+        points = self._stages.handles.points_to_hold(where)
+        numbers = (stiffness, damping, rest_length, breaks_at, origin)
+        attachment = Attachment(points, self.positions_of(points), *numbers)
+        return self._steps.begin_change().handles.attach(attachment)
+
+    def tie(
+        self,
+        where: str | npt.ArrayLike | MaterialPoints,
+        to: npt.ArrayLike,
+        *,
+        stiffness: float,
+        area: float,
+        toughness: float,
+        damping: float = 0.0,
+        rest_length: float | None = None,
+        breaks_at: float = math.inf,
+    ) -> Ligament:
+        """Tie points of the tissue by strands to places in the world; return the ligament.
+
+        The edge of the blade cuts the strands that it sweeps across (`tissue.integrators.strands`):
+        cross-section times toughness is in `Energies.breaking`.
+
+        Args:
+            where: Points as `attach` takes them.
+            to: Where the strands end [m], shape (3,), or one place for each point, (n, 3).
+            stiffness: Of all strands together, along them [N/m].
+            area: Cross-section of all strands together [m2].
+            toughness: Energy of cutting them [J/m2].
+            damping: Of all of them together, along them [N s/m].
+            rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
+            breaks_at: Force of all of them at which they release the tissue [N].
+
+        Raises:
+            ValueError: see `attach`; or `to` has another shape.
+        """
+        points = self._stages.handles.points_to_hold(where)
+        ends = ends_of_strands(self.positions_of(points), to, rest_length)
+        ligament = Ligament(points, *ends, stiffness, area, toughness, damping, breaks_at)
+        return self._steps.begin_change().handles.attach(ligament)
+
+    def collide_with(
+        self,
+        geoms: Sequence[Geom],
+        origins: npt.ArrayLike | None = None,
+        rotations: npt.ArrayLike | None = None,
+    ) -> GeomContact:
+        """Make the tissue touch rigid geoms from now on, and no others; return the contact.
+
+        Skin and lips stay outside the geoms, and rub on them by Coulomb's law: what sticks does not
+        creep. `GeomContact.move` moves the geoms. In the account of energy their work is that of
+        loads, and what friction and impacts take that of contact.
+
+        Args:
+            geoms: What the tissue can touch.
+            origins: Origin of each [m], shape (n, 3); None: that of the tissue's frame.
+            rotations: Axes of each as columns, shape (n, 3, 3); None: those of the tissue's frame.
+
+        Raises:
+            ValueError: a geom makes no sense or is inside; `hierarchical` relaxation has no geoms.
+        """
+        self._stages.handles.expect_all_nodes_move("tissue does not touch geoms")
+        return self._steps.begin_change().model.touch(geoms, origins, rotations)
+
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """The attachments and ligaments that hold, in the order in which they were made."""
+        return self._stages.handles.attachments.all
+
+    def release(self, held: Load | Attachment) -> None:
+        """End a load of `push`, or release an attachment.
+
+        Raises:
+            ValueError: it does not act on this tissue, or was released before.
+        """
+        self._steps.begin_change().handles.release(held)
+
+    def move_supports(self, where: str | npt.ArrayLike, velocity: npt.ArrayLike) -> None:
+        """Move fixed nodes at a velocity, from the next step on until it is given again.
+
+        Their displacement in a step is the velocity times its length. Nodes that a cut puts between
+        them move with them. `settle` stops them. Their work is in the account of energy.
+
+        Args:
+            where: A region as text (`fixed_nodes`) or as a mask, shape (n_nodes,), of which the
+                fixed nodes are moved; or numbers of nodes, shape (n,), all fixed.
+            velocity: [m/s], shape (3,), or one for each of these nodes, shape (n, 3).
+
+        Raises:
+            ValueError: no node there is fixed, one of a list is not, the velocity has another shape
+                or is not finite, or the relaxation is `hierarchical`, which moves no support.
+        """
+        self._stages.handles.expect_all_nodes_move("supports do not move")
+        self._steps.expect_moving()
+        self._stages.handles.move_supports(where, velocity)
+
+    def support_forces(self) -> FloatArray:
+        """Return the force of the supports on each fixed node now [N], shape (n_nodes, 3).
+
+        Zero for nodes that are not fixed. It balances elastic and viscous forces, weight, loads,
+        the blade, and contacts of the body with itself and the floor.
+        """
+        return self._stages.handles.support_forces()
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return self._model.body.n_nodes
+
+    @property
+    def n_tetrahedra(self) -> int:
+        """Number of tetrahedra."""
+        return self._model.body.n_tetrahedra
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the body [m], shape (2, 3)."""
+        return bounds_of_body(self._body)
+
+    def snapshot(self) -> Snapshot:
+        """Return a copy of the whole state."""
+        return snapshot_of(self._body)
+
+    def surface(self) -> Surface:
+        """Return the boundary triangles, skin and cut faces apart."""
+        return boundary_surface(self._body)
+
+    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
+        """Return a quantity at each vertex of `surface()`, shape (n_vertices,).
+
+        `displacement`: distance from rest [m]. `strain`: largest principal Green-Lagrange strain,
+        (l^2 - 1) / 2 where the most stretched direction is l times as long. `stress`: equivalent
+        stress of von Mises of the elastic Cauchy stress [Pa], under any law, less what has relaxed.
+        Strain and stress are the mean of the tetrahedra around the node, by volume.
+
+        Raises:
+            ValueError: there is no such quantity.
+        """
+        return surface_values_of(self._body, self._model.elasticity.arrays, quantity)
+
+    def chunks(self) -> Chunks:
+        """Return boxes that hold the body and its ligaments: a blade outside touches nothing."""
+        return self._stages.chunks_now()
+
+    def n_pieces(self) -> int:
+        """Return the number of connected pieces."""
+        return n_pieces_of(self._body)
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return the connected pieces and their mass properties, the largest at rest first."""
+        return pieces_of(self.snapshot())
+
+    def piece_of_tetrahedra(self) -> IntArray:
+        """Return the index in `pieces` of the piece of each tetrahedron, shape (n_tets,)."""
+        return piece_of_tetrahedra(self.snapshot())
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and what they did to elements and time step."""
-        error, solver = path_error(self._body), self.solver
-        return CutReport(
-            n_cut_nodes=error.n_nodes,
-            path_error_mean=error.mean,
-            path_error_largest=error.largest,
-            node_size=self.node_size,
-            guard=0.0 if solver.scheme == "paper" else solver.cut.guard * self.node_size,
-            initial=self._at_first,
-            now=self._system.measures(self._global_stepper.method.limit),
-        )
+        return self._stages.cut_report(self.solver)
 
     def scheme_statistics(self) -> SchemeStatistics | None:
         """Return what the paper's scheme did so far; None where another scheme cuts."""
-        return self._incision.scheme.statistics(self._system.body)
+        return self._stages.incision.scheme.statistics(self._body)
 
-    # stages of a step
+    def save_state(self) -> TissueState:
+        """Return the state between two steps: what follows depends on it alone.
 
-    def _begin_step(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
-        """Take the edge, and start the totals of a step.
+        The same steps after `load_state` give the same bits. It costs less than a step.
 
         Raises:
-            ValueError: no blade can move so, or it does not fit the mesh.
+            TissueError: the body has stopped (`step`).
         """
-        system = self._system
-        if sweep is None:
-            self._take_edge(None)
-        elif system.interaction.is_other_edge(edge.length):
-            edge_or_error(sweep)  # before the tissue is released
-            self._take_edge(edge)
-        if not system.interaction.begin_step(system.body, edge, dt, sweep is None):
-            assert sweep is not None
-            edge_or_error(sweep)  # it takes numbers whose squares are not finite
-            system.interaction.begin_step(system.body, edge, dt, True)
-        self._edge_now = (edge, 0.0)
-        system.contact.begin()
+        self._steps.expect_moving()
+        return TissueState.of(self, self._identity, self._spares)
 
-    def _relax(self, increment: Increment, has_blade: bool) -> int:
-        """Relax by an increment; return the substeps that it took."""
-        system = self._system
-        before = self._begin_driving(increment, has_blade)
-        n = self._integrator.relax(system, self._blade_context, increment, has_blade)
-        self._audit.work_of_loads += self._driven_work(before, increment)
-        self._audit.lost_at_geoms += system.geoms.arrays.dissipated
-        if n > 0:
-            self._audit.forget()
-        self._edge_now = (increment.edge, increment.end)
-        return n
+    def load_state(self, state: TissueState, around: Around | None = None) -> None:
+        """Put the body to a state, its own or that of an equal tissue, as often as wanted.
 
-    def _detect(self, increment: Increment) -> bool:
-        """Trace the path of the edge through the material; return whether it crossed anything."""
-        interaction, incision = self._system.interaction, self._incision
-        travel = interaction.trace(self._blade_context, increment.edge, increment.end)
-        if travel == NOT_ENGAGED:
-            return False
-        incision.has_begun = True
-        return incision.detect(*self._mesh(), travel)
+        A body that has stopped continues. Loads, attachments and geoms are again those of then: in
+        the tissue that was saved the same objects; in another one those with the same number, in
+        the order in which they were made, or new ones. What was made later no longer acts.
 
-    def _end_incision(self) -> None:
-        """Resolve what the blade left uncut; the next contact begins another incision."""
-        if self._incision.has_begun:
-            self._incision.end(self._hooks)
-            self._system.incision_ended()
-            forget_path(self._incision.path)
+        Args:
+            state: The state.
+            around: What refers to the tissue, and was written with it: see `TissueState.to_bytes`.
 
-    def _result(
-        self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, stage_times: StageTimes
-    ) -> StepResult:
-        """Return what the step did."""
-        system, incision = self._system, self._incision
-        report = system.report(self._blade_context, edge, dt)
-        amounts, change = report.amounts, incision.scheme.change
-        return LazyResult.of(
-            report,
-            system.geoms if system.geoms.act else None,
-            int(amounts.n_tetrahedra),
-            int(amounts.n_nodes),
-            incision.scheme.n_active,
-            int(amounts.tip_tetrahedron) if has_blade else -1,
-            amounts.anchored_length,
-            change.area,
-            change.finished_area,
-            amounts.work_of_blade,
-            amounts.work_of_cutting,
-            n_substeps,
-            system.contact.report(dt),
-            stage_times,
-            self._audit.energies(system, edge),
-        )
+        Raises:
+            StateError: it is no state, or of another version, body or settings; nothing changes.
+        """
+        before = self.attachments
+        state.load_into(self, self._identity, around)
+        self._steps.state_loaded()
+        self._stages.handles.forget_later(before)
 
-    @property
-    def _blade_context(self) -> BladeContext:
-        system, path = self._system, self._incision.path
-        where = (path, self._bounds, self._slit_reach)
-        return system.interaction.context(system.body, system.visits, *where)
-
-    # changes of the mesh
-
-    @property
-    def _hooks(self) -> CutHooks:
-        return CutHooks(self._before_cut, self._after_pass, self._after_cut, self._mesh)
-
-    def _mesh(self) -> tuple[Body, Visits]:
-        return self._system.body, self._system.visits
-
-    def _before_cut(self) -> None:
-        self._audit.before_cut(self._system, *self._edge_now)
-
-    def _after_pass(self) -> None:
-        """Update what depends on the tetrahedra that changed, and make room for another pass."""
-        system, change = self._system, self._incision.scheme.change
-        if change.n_dirty == 0 and not change.is_full:
-            return
-        n = touched_nodes(system.body, change, system.visits, self._touched)
-        if n:
-            self._chunks = None
-            self._audit.forget()
-            nodes = self._touched[:n]
-            system.mesh_changed(change, nodes, *self._edge_now)
-            self._integrator.mesh_changed(nodes)
-            self._hold_again()
-        self._make_room()
-
-    def _after_cut(self) -> None:
-        self._audit.after_cut(self._system, *self._edge_now)
-
-    def _make_more_room(self, lacking: int) -> None:
-        self._incision.scheme.make_room(lacking)
-        self._make_room()
-
-    def _make_room(self) -> None:
-        """Make room for the next pass of a cut: arrays double when they are nearly full."""
-        room = room_for_a_pass(self._system.body, self._incision.scheme.doubled_nodes)
-        if room is not None:
-            self._system.grow(*room)
-            self._incision.scheme.grow(*room)
-            self._integrator.grow(room[0])
-            self._touched = np.zeros(room[0], dtype=np.int64)
-
-    def _take_edge(self, edge: Edge | None) -> None:
-        """Take the edge of this blade; another blade, or none, releases the tissue."""
-        length = 0.0 if edge is None else edge.length
-        interaction = self._system.interaction
-        if interaction.is_other_edge(length):
-            if edge is not None:
-                interaction.expect_usable_edge(length)
-                expect_toughness_in_range(self.material, self.node_size)
-            self._end_incision()
-            interaction.replace_edge(length, self._system.body, *self._edge_now)
-            self._incision.take_edge(interaction.n_samples)
+    def expect_state(self, state: TissueState) -> None:
+        """Raise StateError for a state of another body, settings or version; change nothing."""
+        state.expect_of(self._identity)

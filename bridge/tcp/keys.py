@@ -6,7 +6,7 @@ import secrets
 import stat
 from pathlib import Path
 
-from tissue import new_whole_file
+from tissue.support import new_whole_file
 
 KEY_VARIABLE = "SCALPEL_SIM_KEY"
 """Environment variable that holds a key, if no file is given."""

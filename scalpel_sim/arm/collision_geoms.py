@@ -7,7 +7,8 @@ import numpy as np
 
 from bridge import ArmGeom, FixtureBox, GeomShape
 from scalpel_sim.arm.joint_reach import JointReach, hinge_displacement
-from tissue import FloatArray, IntArray, SameTypes, kernel
+from tissue import FloatArray, IntArray
+from tissue.support import SameTypes, kernel
 
 _SHAPES: dict[int, tuple[GeomShape, int]] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),

@@ -17,7 +17,8 @@ from scalpel_sim.quaternions import (
     rotated,
     turn_between,
 )
-from tissue import BladeSegment, FloatArray, kernel
+from tissue import BladeSegment, FloatArray
+from tissue.support import kernel
 
 _HAND = "hand"
 """Name of the body that shows where the hand wants the middle of the edge, and of its site."""

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from tissue import FloatArray, kernel
+from tissue import FloatArray
+from tissue.support import kernel
 
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 

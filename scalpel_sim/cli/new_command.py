@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.runs.console import log_to_stderr
 from scalpel_sim.runs.options import OUTPUT, Flag, PrintOptions
-from tissue import new_whole_file, whole_file
+from tissue.support import new_whole_file, whole_file
 
 
 def new(

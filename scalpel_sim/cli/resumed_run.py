@@ -13,7 +13,7 @@ from scalpel_sim.runs.prepared_run import PreparedRun, perform_script
 from scalpel_sim.runs.resumption import Resumption, resumption_of
 from scalpel_sim.runs.run_folder import check_folder
 from scalpel_sim.scene.read import read_scene
-from tissue import whole_file
+from tissue.support import whole_file
 
 
 def perform_resumed(

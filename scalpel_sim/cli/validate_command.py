@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from scalpel_sim.errors import CheckError, RunError, UsageError
 from scalpel_sim.runs.console import log_to_stderr, say
 from scalpel_sim.runs.options import PrintOptions
-from tissue import whole_file
+from tissue.support import whole_file
 
 if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.scene.case import CaseContent

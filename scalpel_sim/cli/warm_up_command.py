@@ -77,7 +77,7 @@ def _sets(names: Sequence[str | None], tissue: TissueOptions) -> list["KernelSet
 
 def _report(printing: PrintOptions) -> None:
     """Print where the kernels are, how large they are, and how another machine uses them."""
-    from tissue import cache_directory, n_compiled_kernels
+    from tissue.support import cache_directory, n_compiled_kernels
 
     folder = cache_directory()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())

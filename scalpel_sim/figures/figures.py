@@ -26,7 +26,8 @@ from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.textures import map_texture
-from tissue import FloatArray, whole_file
+from tissue import FloatArray
+from tissue.support import whole_file
 
 WHITE = (1.0, 1.0, 1.0)
 """Colour of table and background (sRGB)."""

@@ -7,7 +7,8 @@ import numpy as np
 
 from scalpel_sim.figures.camera import View, parallel_view
 from scalpel_sim.figures.rasterise import rasterise
-from tissue import BoolArray, FloatArray, kernel
+from tissue import BoolArray, FloatArray
+from tissue.support import kernel
 
 N_LAMP, N_SKY = 32, 64
 """Number of directions that stand for the lamp and for the sky. With fewer, shadows have steps."""

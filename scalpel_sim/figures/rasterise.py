@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue import FloatArray, IntArray, kernel
+from tissue import FloatArray, IntArray
+from tissue.support import kernel
 
 _FLAT = 1e-12
 """Twice the area [pixels squared] up to which a triangle is not drawn: it is seen edge-on."""

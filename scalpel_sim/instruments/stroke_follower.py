@@ -7,7 +7,8 @@ from scalpel_sim.arm.hand import Hand, lead_to
 from scalpel_sim.quaternions import Vector
 from scalpel_sim.strokes.path import pose_on_path
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import FloatArray, SameTypes, kernel
+from tissue import FloatArray
+from tissue.support import SameTypes, kernel
 
 
 class StrokeFollower:

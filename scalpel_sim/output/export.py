@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
-from tissue import BoolArray, FloatArray, IntArray, Surface, whole_file
+from tissue import BoolArray, FloatArray, IntArray, Surface
+from tissue.support import whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
     from trimesh import Scene, Trimesh

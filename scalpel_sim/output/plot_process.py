@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from scalpel_sim.errors import RunError
-from tissue import whole_file
+from tissue.support import whole_file
 
 _TIMEOUT = 60.0
 """How long a plot may take [s]. It takes a second, or ten when matplotlib first looks for fonts."""

@@ -18,10 +18,10 @@ from tissue import (
     Snapshot,
     TetrahedralMesh,
     boundary_faces,
-    components,
     pieces_of,
     toughness_law_of,
 )
+from tissue.support import components
 
 _SAME_PLACE = 0.5
 """Distance within which a cut goes where one has gone before, in node sizes: it snaps to nodes that

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue import FloatArray, RigidContacts, kernel
+from tissue import FloatArray, RigidContacts
+from tissue.support import kernel
 
 EDGE_COSINE = 0.9
 """Cosine of the angle between a contact's normal and the blade's forward direction above which the

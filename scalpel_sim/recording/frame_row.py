@@ -8,7 +8,8 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.recording.force_parts import add_up, force_parts
 from scalpel_sim.recording.recording import N_OF_ACCOUNT
-from tissue import BladeSegment, Energies, FloatArray, StepResult, Wrench, kernel
+from tissue import BladeSegment, Energies, FloatArray, StepResult, Wrench
+from tissue.support import kernel
 
 NO_ACCOUNT = (math.nan,) * N_OF_ACCOUNT
 """The energies of a frame without an audit."""

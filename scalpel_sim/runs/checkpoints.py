@@ -13,7 +13,8 @@ import msgspec
 
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
 from scalpel_sim.runs.journal import RunMark, RunPlan
-from tissue import StateError, whole_file
+from tissue import StateError
+from tissue.support import whole_file
 
 CHECKPOINT_SECONDS = 1.0
 """Simulated time between two checkpoints, where nothing is said of it [s]."""

@@ -25,7 +25,8 @@ from scalpel_sim.runs.file_names import (
 from scalpel_sim.runs.journal import RunMark, RunPlan, read_journal
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state import SimulationState
-from tissue import FloatArray, whole_file
+from tissue import FloatArray
+from tissue.support import whole_file
 
 CHANGED_SCENE = "scene.changed.toml"
 """Name of a `scene.toml` that was not the one of the run."""

@@ -37,7 +37,8 @@ from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import Snapshot, remove_unfinished, whole_file, write_vtu
+from tissue import Snapshot, write_vtu
+from tissue.support import remove_unfinished, whole_file
 
 T = TypeVar("T")
 

@@ -38,11 +38,9 @@ from tissue import (
     TetrahedralMesh,
     Tissue,
     block,
-    cache_directory,
     fixed_nodes,
-    is_compiling,
-    n_compiled_kernels,
 )
+from tissue.support import cache_directory, is_compiling, n_compiled_kernels
 
 _SIDE = 0.02
 """Length of the sides of the block that is cut [m]."""

@@ -6,7 +6,8 @@ import numpy as np
 
 from scalpel_sim.strokes.planned_sheet import mesh_edges
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import BoolArray, FloatArray, Snapshot, components
+from tissue import BoolArray, FloatArray, Snapshot
+from tissue.support import components
 
 _POSES = 200
 """Poses of a stroke between which its sheet is flat: 0.5 mm of an organ each."""

@@ -1,7 +1,8 @@
 """The path of a blade as a table, and the pose on it at one instant."""
 
 from scalpel_sim.quaternions import Vector, matrix_of, turned_on
-from tissue import FloatArray, kernel
+from tissue import FloatArray
+from tissue.support import kernel
 
 
 @kernel

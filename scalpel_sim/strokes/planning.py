@@ -168,7 +168,7 @@ def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
 
 def _sheet(name: str, mesh: TetrahedralMesh, edges: IntArray) -> PlannedSheet:
     """Return the first sheet that parts the body in two, or else the first of all."""
-    from tissue import components  # loads numba
+    from tissue.support import components  # loads numba
 
     pieces, _ = components(len(mesh.positions), edges)
     first = None
@@ -231,7 +231,7 @@ def _divides(sheet: PlannedSheet, mesh: TetrahedralMesh, edges: IntArray, pieces
     A tetrahedron's part on one side of the sheet holds its nodes on that side, joined by edges; so
     the parts of the body hang together as its nodes do along the edges that do not cross.
     """
-    from tissue import components
+    from tissue.support import components
 
     above = is_above(sheet.height(mesh.positions))
     whole = edges[above[edges[:, 0]] == above[edges[:, 1]]]

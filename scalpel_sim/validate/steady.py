@@ -30,8 +30,8 @@ from tissue import Law, Material, block
 
 STEADY_YOUNG_MODULUS = 30e3
 """Young's modulus [Pa], high enough for neo-Hookean tetrahedra of both meshes and all toughnesses
-(`tissue.input_checks.TOUGHEST`): at 160 J/m2 toughness over modulus is 5.3 mm, and the node size of
-the finer mesh is 2.4 mm. Springs bear the two lowest."""
+(`tissue.blade.toughness.TOUGHEST`): at 160 J/m2 toughness over modulus is 5.3 mm, and the node size
+of the finer mesh is 2.4 mm. Springs bear the two lowest."""
 STEADY_LENGTH = 0.1
 """Length of the block along the cut [m]. The edge dents the block before it breaks in, at 160 J/m2
 by some 10 mm, and makes that good on the first 40 mm: there it cuts more than it travels."""

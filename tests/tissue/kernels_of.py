@@ -8,6 +8,7 @@ import numpy as np
 from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
 from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
+from tissue.blade.edge import NOWHERE
 from tissue.contact.geoms.geom_contact import no_geoms
 from tissue.contact.response.contacts import new_penalty_forces
 from tissue.core.thread_team import new_team
@@ -39,7 +40,6 @@ from tissue.mesh.changes import new_change
 from tissue.mesh.loose_pieces import no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, no_visits
 from tissue.mesh.workspace import SPARE_NODES
-from tissue.tissue import NOWHERE
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
 

@@ -63,7 +63,7 @@ def test_a_long_edge_has_as_many_samples_as_a_short_one_for_its_length(tissue):
     def samples(length):
         heel = POSE.tip + np.array([0.0, 0.0, length])
         tissue.step(BladeSweep(POSE._replace(heel=heel), POSE._replace(heel=heel)), 1e-3)
-        return tissue._system.interaction.n_samples - 1
+        return tissue._model.interaction.n_samples - 1
 
     assert samples(3.0) == pytest.approx(10 * samples(0.3), rel=0.02)
 
@@ -262,7 +262,7 @@ def test_a_tissue_that_is_no_longer_used_is_freed_at_once():
     try:
         tissue = Tissue(MESH)
         strokes.make(tissue, strokes.straight(MESH))
-        remains = weakref.ref(tissue._system)
+        remains = weakref.ref(tissue._model)
         del tissue
         assert remains() is None
     finally:

@@ -42,6 +42,10 @@ class Edge(Vectors):
         return max(tip, math.dist(numbers[12:15], numbers[3:6]))
 
 
+NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
+"""The edge of no blade."""
+
+
 class BladePose(NamedTuple):
     """Position and axes of the blade at one instant."""
 

@@ -20,7 +20,7 @@ from tissue.blade.blade_context import (
 from tissue.blade.blade_state import new_blade_state
 from tissue.blade.blunt_contact import new_blunt_contacts
 from tissue.blade.blunt_search import relocate_blunt_sides
-from tissue.blade.edge import Edge
+from tissue.blade.edge import NOWHERE, Edge
 from tissue.blade.forces import begin_blade_step, release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
@@ -33,7 +33,7 @@ from tissue.core.jit import SameTypes
 from tissue.cutting.blade_path import Path
 from tissue.material import Material
 from tissue.mesh.body import Body
-from tissue.mesh.changes import Change
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.moved_nodes import Moved, forget_moved
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import build_grid, no_grid
@@ -86,6 +86,9 @@ class BladeInteraction:
         self._n_strands = 0
         self._renew_report()
         self._edge_length = 0.0
+        self.edge_now = (NOWHERE, 1.0)
+        """The cutting edge over the last time step, and the instant of it that was reached, as a
+        fraction."""
         self._grid = no_grid()
         self._all_nodes = np.zeros(0, np.int64)
         self._context: BladeContext | None = None
@@ -143,16 +146,14 @@ class BladeInteraction:
             f"mm. {advice}"
         )
 
-    def replace_edge(self, length: float, body: Body, edge: Edge, when: float) -> None:
+    def replace_edge(self, length: float, body: Body) -> None:
         """Release the anchors of the current edge, and use an edge of another length.
 
         Args:
             length: Length of the new edge [m]; 0 for no edge.
             body: The tissue.
-            edge: The current edge over the last time step.
-            when: Instant of the release, as a fraction of that time step.
         """
-        release_edge(self.state, body, edge, when)
+        release_edge(self.state, body, *self.edge_now)
         n = math.ceil(length / self._node_size * SAMPLES_PER_NODE_SIZE) + 1
         anchors = new_anchors(max(n, 2), length, self._stiffness)
         self.state = self.state.replaced(anchors=anchors)
@@ -162,23 +163,15 @@ class BladeInteraction:
         self._renew_report()
         self._edge_length = length
 
-    def grow(self, n_tetrahedra: int) -> None:
-        """Make room for that many tetrahedra."""
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many tetrahedra; there are no rows of nodes."""
+        del n_nodes
         self.state = self.state.replaced(sides=grown_side_contacts(self.state.sides, n_tetrahedra))
 
-    def mesh_changed(
-        self, body: Body, visits: Visits, change: Change, edge: Edge, when: float
-    ) -> None:
-        """Find the tetrahedra of the anchors again after a pass of a cut.
-
-        Args:
-            body: The body.
-            visits: For searches.
-            change: What the pass changed.
-            edge: The cutting edge over the time step.
-            when: Instant of the pass, as a fraction of it.
-        """
-        relocate(self.state, body, visits, edge, when)
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Find the tetrahedra of the anchors again after a pass of a cut."""
+        body, visits, change, _ = changed
+        relocate(self.state, body, visits, *self.edge_now)
         relocate_blunt_sides(self.state, body, visits)
         if self._shape is not None:
             forget_changed_faces(self.state.sides, body, change.dirty, change.n_dirty)

@@ -44,7 +44,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes
 from tissue.core.simd import room_for_points
 from tissue.mesh.body import Body, grown
-from tissue.mesh.changes import Change
+from tissue.mesh.changes import ChangedMesh
 from tissue.types import BodyContacts
 
 ADDED_SHARE = 0.55
@@ -219,12 +219,12 @@ class SelfContact:
         self._n_contacts = self.forces.n_contacts
         self._has_touched = self._has_touched or self._n_contacts > 0
 
-    def mesh_changed(self, body: Body, change: Change) -> None:
+    def mesh_changed(self, changed: ChangedMesh) -> None:
         """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""
         if not self._acts:
             return
-        faces = with_room(self._search.faces, 4 * change.n_dirty)
-        update_changed_faces(faces, body, change)
+        faces = with_room(self._search.faces, 4 * changed.change.n_dirty)
+        update_changed_faces(faces, changed.body, changed.change)
         self._take_faces(faces)
         self._search.has_new_faces = self._search.is_listing_due = 1
         self._is_searched = False

@@ -7,6 +7,7 @@ from typing import NamedTuple, NoReturn
 from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.scheme import Scheme
 from tissue.mesh.body import Body
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.star import LARGEST_STAR, Visits
 from tissue.types import TissueError
 
@@ -104,6 +105,13 @@ class Incision:
                 "elsewhere"
             )
         return max(1, math.ceil(n))
+
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Do nothing: the scheme made the change."""
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        self.scheme.grow(n_nodes, n_tetrahedra)
 
     def take_edge(self, n_samples: int) -> None:
         """Prepare for an edge of that many samples."""

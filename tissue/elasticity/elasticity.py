@@ -27,7 +27,7 @@ from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
-from tissue.mesh.changes import Change
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 ROOM_FOR_SPRINGS = 1 << 16
@@ -98,22 +98,13 @@ class Elasticity:
             scaling.allowed_between_cuts = scaling.allowed
             scaling.most = LARGEST_ADDED_MASS * float(body.masses[:n_nodes].sum())
 
-    def mesh_changed(
-        self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
-    ) -> None:
-        """Update masses, springs, elements and bounds after a cut.
-
-        Args:
-            body: The body; masses and velocities of the touched nodes are written.
-            visits: For searches.
-            change: The tetrahedra that changed.
-            nodes: Nodes, of which the first `n` are the nodes of those tetrahedra.
-            n: How many these are.
-        """
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Update masses, springs, elements and bounds after a pass of a cut."""
+        body, visits, change, nodes = changed
         if self.relaxes:
             inherit_relaxed(self.arrays.solid, change.children, change.n_children)
-        self._write(body, visits, change.dirty[: change.n_dirty], nodes[:n])
-        return_spin(body, change, self._material.density, nodes, n)
+        self._write(body, visits, change.dirty[: change.n_dirty], nodes)
+        return_spin(body, change, self._material.density, nodes, len(nodes))
 
     def return_mass(self, body: Body) -> None:
         """Take back mass that nodes got between cuts and do not need at rest."""

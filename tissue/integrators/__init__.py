@@ -1,7 +1,7 @@
 """Relaxation (RX in the paper's Table 1): methods that advance the motion of the body.
 
 - `integrator`: what an integrator does, and which one a user's `options` stand for.
-- `system`, `step_context`: what takes part in a step, for Python and for kernels.
+- `model`, `step_context`: what takes part in a step, for Python and for kernels.
 - `relaxation`: a whole increment in one call, as `advance` and `step_choice` divide it into steps;
   `staged_relaxation`: the same stage by stage, for methods that do more in between.
 - `global_stepper`: all nodes together, by `nystroem` (the default), `runge_kutta` (for springs) or

@@ -15,10 +15,10 @@ from tissue.core.array_types import FloatArray
 from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.equilibrium_checks import SupportConditions, fastest_node, gone_too_far
 from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.model import TissueModel
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
 from tissue.integrators.step_context import Increment
-from tissue.integrators.system import System
 from tissue.integrators.unstable import UnstableError, not_finite
 from tissue.types import TissueError
 
@@ -71,7 +71,7 @@ class Settling(NamedTuple):
 
 
 def settle(
-    stepper: GlobalStepper, system: System, edge: Edge, support: SupportConditions
+    stepper: GlobalStepper, system: TissueModel, edge: Edge, support: SupportConditions
 ) -> Settling:
     """Relax to equilibrium. Supports that move stop.
 
@@ -106,7 +106,7 @@ def settle(
 
 
 def _relax(
-    stepper: GlobalStepper, system: System, edge: Edge, support: SupportConditions
+    stepper: GlobalStepper, system: TissueModel, edge: Edge, support: SupportConditions
 ) -> Settling:
     """Move the nodes until they are at rest, or for `LONGEST_SETTLING` steps."""
     body, n, rate = system.body, system.body.n_nodes, 0.0
@@ -131,7 +131,7 @@ def _relax(
     return Settling(LONGEST_SETTLING, False, before)
 
 
-def _disturb(system: System) -> None:
+def _disturb(system: TissueModel) -> None:
     """Move every free node a little, always in the same way.
 
     A symmetric body that is compressed from a symmetric start comes to a symmetric equilibrium, be
@@ -144,7 +144,7 @@ def _disturb(system: System) -> None:
     body.positions[:n][free] += DISTURBANCE * system.node_size * ways[free]
 
 
-def _take_steps(stepper: GlobalStepper, system: System, edge: Edge, rate: float) -> Look:
+def _take_steps(stepper: GlobalStepper, system: TissueModel, edge: Edge, rate: float) -> Look:
     """Take steps, each after its damping.
 
     Args:
@@ -163,7 +163,7 @@ def _take_steps(stepper: GlobalStepper, system: System, edge: Edge, rate: float)
     dt = STEPS_BETWEEN_LOOKS * step
     contact.begin()
     system.find_contacts(dt)
-    system.geoms.begin_step(system.body, dt)
+    system.find_geom_contacts(dt)
     velocities = system.body.velocities[:n]
     for i in range(STEPS_BETWEEN_LOOKS):
         velocities *= math.exp(-2.0 * rate * step)
@@ -199,7 +199,7 @@ class _Watch:
         support: What it comes to rest on.
     """
 
-    def __init__(self, system: System, support: SupportConditions) -> None:
+    def __init__(self, system: TissueModel, support: SupportConditions) -> None:
         self._system, self._support = system, support
         self._begin = self._positions.copy()
         self._farthest = FARTHEST_HELD * float(np.linalg.norm(np.ptp(self._begin, axis=0)))

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.integrators.model import TissueModel
 from tissue.integrators.own_weight import OwnWeight, expect_bearable, own_weight
-from tissue.integrators.system import System
 from tissue.material import Material
 from tissue.mesh.loose_pieces import loose_pieces_of
 from tissue.types import TissueError
@@ -36,7 +36,7 @@ class SupportConditions(NamedTuple):
         return "less gravity, load or stretch, or a stiffer material, may help"
 
 
-def support_of(system: System, material: Material, floor: float | None) -> SupportConditions:
+def support_of(system: TissueModel, material: Material, floor: float | None) -> SupportConditions:
     """Return what a body comes to rest on, after a look whether it can.
 
     What is attached, and what touches geoms, is not looked at: only motion tells whether they hold.
@@ -57,7 +57,7 @@ def support_of(system: System, material: Material, floor: float | None) -> Suppo
     return support
 
 
-def _expect_held(system: System, floor: float | None) -> None:
+def _expect_held(system: TissueModel, floor: float | None) -> None:
     """Refuse a body that nothing can hold against its weight and its loads.
 
     Raises:
@@ -86,7 +86,7 @@ def _expect_held(system: System, floor: float | None) -> None:
 
 
 def gone_too_far(
-    system: System, node: int, begin: FloatArray, support: SupportConditions
+    system: TissueModel, node: int, begin: FloatArray, support: SupportConditions
 ) -> TissueError:
     """Return the error that says why a node has gone far away, as far as can be seen.
 
@@ -123,7 +123,7 @@ def gone_too_far(
     )
 
 
-def _loose_piece(system: System, node: int) -> IntArray:
+def _loose_piece(system: TissueModel, node: int) -> IntArray:
     """Return the nodes of the piece that a node belongs to; none if one of them is fixed."""
     loose = loose_pieces_of(system.body)
     for begin, end in pairwise(loose.begin.tolist()):
@@ -159,7 +159,7 @@ class FastestNode(NamedTuple):
         )
 
 
-def fastest_node(system: System, accelerations: FloatArray) -> FastestNode:
+def fastest_node(system: TissueModel, accelerations: FloatArray) -> FastestNode:
     """Return the node of a body that is accelerated most.
 
     Args:
@@ -172,7 +172,7 @@ def fastest_node(system: System, accelerations: FloatArray) -> FastestNode:
 
 
 def warn_of_motion(
-    system: System,
+    system: TissueModel,
     n_steps: int,
     accelerations: FloatArray,
     support: SupportConditions,

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tissue.blade.blade_context import BladeContext
-from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
+from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.relaxation import (
     FIND_FACES,
@@ -33,11 +33,11 @@ from tissue.integrators.substeps import (
     runge_kutta_steps,
     verlet_steps,
 )
-from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
 from tissue.integrators.unstable import UnstableError, not_finite
 from tissue.material import Law
 from tissue.mesh.body import Body
+from tissue.mesh.changes import ChangedMesh
 
 _ROOM = SameTypes(room_for_contact)
 
@@ -102,7 +102,7 @@ class GlobalStepper:
             self._choice.refinement = refinement
 
     def relax(
-        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
     ) -> int:
         """Relax by an increment; return the steps taken. See `Integrator.relax`."""
         contact = system.contact
@@ -122,13 +122,13 @@ class GlobalStepper:
                 expect_stable(choice)
             if outcome == NOT_FINITE:
                 raise not_finite()
-            blade, stage = system.interaction.with_room(outcome, blade), arrays.stage
+            blade, stage = system.with_blade_room(outcome, blade), arrays.stage
         n = choice.done
         if n > 0:
             system.find_new_loose_pieces()
         return n
 
-    def advance(self, system: System, increment: Increment) -> int:
+    def advance(self, system: TissueModel, increment: Increment) -> int:
         """Advance the motion by an increment; return the steps taken."""
         choice = self._find_contacts(system, increment, self._choice_for(system))
         context = system.context
@@ -139,21 +139,21 @@ class GlobalStepper:
         expect_stable(choice)
         return choice.done
 
-    def take_steps(self, system: System, increment: Increment, n: int) -> None:
+    def take_steps(self, system: TissueModel, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
         if self._threads is not None:
             self._threads.join(system.context)
         self.method.take_steps(system.context, *increment, n)
 
     def _find_contacts(
-        self, system: System, increment: Increment, choice: StepChoice
+        self, system: TissueModel, increment: Increment, choice: StepChoice
     ) -> StepChoice:
         """Find the contacts of an increment; return the choice of steps with what they add."""
         room = _ROOM.call(choice, system.context, increment.span)
         system.find_contacts(increment.span, room)
         return self._choice_for(system)
 
-    def _choice_for(self, system: System) -> StepChoice:
+    def _choice_for(self, system: TissueModel) -> StepChoice:
         """Return the choice of steps, with what contact adds to the frequencies now."""
         choice, n_nodes = self._choice, len(system.body.masses)
         if choice is None or len(choice.no_frequency) != n_nodes:
@@ -164,7 +164,7 @@ class GlobalStepper:
         return choice
 
     def _arrays(
-        self, system: System, blade: BladeContext, choice: StepChoice, stage: int
+        self, system: TissueModel, blade: BladeContext, choice: StepChoice, stage: int
     ) -> Relaxation:
         """Return the arrays as one struct; another one where an owner has replaced its own.
 
@@ -190,7 +190,7 @@ class GlobalStepper:
         relaxation.stage = stage
         return relaxation
 
-    def mesh_changed(self, nodes: IntArray) -> None:
+    def mesh_changed(self, changed: ChangedMesh) -> None:
         """Move the body again; `Solid.is_bound_current` says that bounds have changed."""
         self.wake()
 
@@ -199,7 +199,7 @@ class GlobalStepper:
         if self._choice is not None:
             self._choice.calm, self._choice.is_at_rest = 0.0, 0
 
-    def let_rest(self, system: System) -> None:
+    def let_rest(self, system: TissueModel) -> None:
         """Move a body that has settled only once something acts on it."""
         self._choice_for(system).calm = TIME_TO_REST
 
@@ -207,7 +207,7 @@ class GlobalStepper:
         """Forget the bound on the strained body: it is another one now."""
         self._choice = None
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Do nothing: there are no arrays."""
 
 

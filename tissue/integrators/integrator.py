@@ -5,10 +5,11 @@ from typing import Protocol
 from tissue.blade.blade_context import BladeContext
 from tissue.core.array_types import IntArray
 from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Hierarchical, IntegratorOptions
 from tissue.integrators.step_context import Increment
-from tissue.integrators.system import System
 from tissue.mesh.body import Body
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.moved_nodes import Moved
 
 
@@ -26,7 +27,7 @@ class Integrator(Protocol):
         ...
 
     def relax(
-        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
     ) -> int:
         """Relax (RX) by an increment; return how many steps the finest nodes took.
 
@@ -43,20 +44,20 @@ class Integrator(Protocol):
         """
         ...
 
-    def advance(self, system: System, increment: Increment) -> int:
+    def advance(self, system: TissueModel, increment: Increment) -> int:
         """Advance the motion by an increment; return how many steps the finest nodes took."""
         ...
 
-    def mesh_changed(self, nodes: IntArray) -> None:
-        """Take note that the mesh around these nodes changed."""
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Note that a pass of a cut changed the mesh."""
         ...
 
     def body_moved(self, body: Body) -> None:
         """Take note that every node moved by other means, and is at rest."""
         ...
 
-    def grow(self, n_nodes: int) -> None:
-        """Make room for that many nodes."""
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
         ...
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray
-from tissue.integrators.system import System
+from tissue.integrators.model import TissueModel
 from tissue.material import Material
 from tissue.mesh.validation import USUAL_EXTENT
 from tissue.types import TissueError
@@ -57,7 +57,7 @@ class OwnWeight(NamedTuple):
         )
 
 
-def own_weight(system: System, material: Material, floor: float | None) -> OwnWeight | None:
+def own_weight(system: TissueModel, material: Material, floor: float | None) -> OwnWeight | None:
     """Return the weight of a body against its stiffness; None where it is no matter.
 
     Args:
@@ -85,7 +85,7 @@ def expect_bearable(weight: OwnWeight | None) -> None:
         raise TissueError(f"the body cannot come to rest: {weight.described}")
 
 
-def _farthest_from_support(system: System, floor: float | None) -> float:
+def _farthest_from_support(system: TissueModel, floor: float | None) -> float:
     """Return how far a node is from what holds the body, at most [m].
 
     Fixed nodes, what is attached and the floor hold it; geoms may, and then as a floor at its
@@ -110,7 +110,7 @@ def _farthest_from_support(system: System, floor: float | None) -> float:
     return farthest if np.isfinite(farthest) else float(np.ptp(positions, axis=0).max())
 
 
-def _is_support(system: System) -> BoolArray:
+def _is_support(system: TissueModel) -> BoolArray:
     """Return which nodes are fixed or attached, shape (n_nodes,)."""
     found: BoolArray = system.body.fixed[: system.body.n_nodes].copy()
     found[system.attachments.nodes] = True

@@ -4,8 +4,8 @@ import math
 
 from tissue.core.limits import MANY_SUBSTEPS, MOST_SUBSTEPS
 from tissue.cut_settings import undamped_steps
+from tissue.integrators.model import TissueModel
 from tissue.integrators.stability import stable_step
-from tissue.integrators.system import System
 
 _SURELY_FEW = 0.1
 """Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
@@ -13,7 +13,7 @@ longest step need not be computed. It takes some 1.3 steps at most for each of t
 `stability.STABILITY_LIMIT`."""
 
 
-def expect_few_steps(system: System, method: int, dt: float) -> None:
+def expect_few_steps(system: TissueModel, method: int, dt: float) -> None:
     """Refuse a time step that takes more than `MOST_SUBSTEPS` steps of the integrator.
 
     Args:

@@ -27,7 +27,7 @@ class Attachment:
         damping: Of all dampers together [N s/m].
         rest_length: Length up to which each point is slack, in any direction [m]; 0: it is held
             where it is.
-        breaks_at: Force at which it lets go [N].
+        breaks_at: Force at which it releases the points [N].
         origin: Origin of the frame [m], shape (3,).
 
     Raises:
@@ -38,7 +38,6 @@ class Attachment:
         self,
         points: MaterialPoints,
         others: FloatArray,
-        *,
         stiffness: float,
         damping: float = 0.0,
         rest_length: float = 0.0,
@@ -82,9 +81,9 @@ class Attachment:
     def wrench(self) -> Wrench:
         """Wrench of the tissue on the frame, averaged over the last step, about its origin now.
 
-        Zero in the steps after the one in which it let go.
+        Zero in the steps after the one in which it was released.
         """
-        # Forces act where the points are: dampers pull beside the line to what they are tied to.
+        # Forces act where the points are: dampers pull off the line to what they are tied to.
         return Wrench(-self._force, -self._moment, np.zeros(3)).about(self._begin[1])
 
     def move(
@@ -104,7 +103,7 @@ class Attachment:
         self._end = (axes, _triple("origin", np.array(origin, dtype=np.float64)))
 
     def follow(self, path: FramePath) -> None:
-        """Have the frame led along a path from now on, without turning, in place of `move`."""
+        """Move the frame along a path from now on, without turning, in place of `move`."""
         self._path, self._seconds, self._start = path, 0.0, self._end[1].copy()
 
     @property
@@ -117,7 +116,7 @@ class Attachment:
         self._end, self._path, self._seconds, self._start = way
 
     def advance(self, dt: float) -> None:
-        """Go on along the path, if there is one, by `dt` [s]; at its end let go, if it says so."""
+        """Follow the path, if there is one, by `dt` [s]; release the points when it says so."""
         if self._path is None:
             return
         if self._seconds >= self._path.release_at:
@@ -135,7 +134,7 @@ class Attachment:
         return first, last
 
     def stop(self) -> None:
-        """Have the frame where it was to be at the end of the next step."""
+        """Put the frame where it was to be at the end of the next step."""
         self._begin = self._end
 
     def end_step(self, force: FloatArray, moment: FloatArray, states: IntArray) -> None:

@@ -31,7 +31,7 @@ class AttachmentList:
 
     def __init__(self) -> None:
         self._attachments: list[Attachment] = []
-        self._let_go: list[Attachment] = []
+        self._released: list[Attachment] = []
         self._n_added = 0
         self.arrays: Attachments = no_attachments()
         """What kernels work on; another one where attachments come or go."""
@@ -59,11 +59,11 @@ class AttachmentList:
 
     @property
     def is_idle(self) -> bool:
-        """Whether a step has none to lead, and none to forget that has let go."""
-        return not (self._attachments or self._let_go)
+        """Whether a step has none to move, and none to forget that was released."""
+        return not (self._attachments or self._released)
 
     def add(self, attachment: Attachment, body: Body) -> None:
-        """Let an attachment hold from now on."""
+        """Add an attachment, which holds from now on."""
         row = len(self.arrays.nodes)
         attachment.number = self._n_added
         self._n_added += 1
@@ -73,7 +73,7 @@ class AttachmentList:
         arrays.released -= attached_energy(arrays, body.positions, row, len(arrays.nodes))
 
     def remove(self, attachment: Attachment, body: Body) -> None:
-        """Let an attachment hold no longer.
+        """Release an attachment.
 
         Raises:
             ValueError: it does not hold this body.
@@ -85,13 +85,13 @@ class AttachmentList:
         self._drop_released(body)
 
     def begin_step(self, body: Body, dt: float) -> None:
-        """Lead the frames that follow a path by `dt` [s], and write where all go in this step."""
+        """Move the frames that follow a path by `dt` [s], and write where all go in this step."""
         for each in self._attachments:
             each.advance(dt)
         self._drop_released(body)
-        for each in self._let_go:
+        for each in self._released:
             each.forget()
-        self._let_go.clear()
+        self._released.clear()
         self._write_targets()
 
     def _write_targets(self) -> None:
@@ -102,14 +102,14 @@ class AttachmentList:
             self.arrays.impulse[:] = self.arrays.turn[:] = 0.0
 
     def stop(self, body: Body) -> None:
-        """Have every frame where it was to be at the end of the next step, and no blade there."""
+        """Put every frame where it was to be at the end of the next step; free the blade."""
         self._free(body)
         for each in self._attachments:
             each.stop()
         self._write_targets()
 
     def begin_increment(self, body: Body, increment: Increment, has_blade: bool) -> None:
-        """Let the blade, which may be gone or another, hold what it has caught."""
+        """Hold what the blade, which may be gone or another, has caught."""
         self.arrays.work = 0.0
         if not self.has_strands:
             return
@@ -150,7 +150,7 @@ class AttachmentList:
         self.added_frequency_squared = frequency_squared(self.arrays, own_masses, stiffening)
 
     def end_step(self, body: Body, dt: float) -> None:
-        """Tell each attachment the force on its points; drop those that have let go."""
+        """Write the force on its points to each attachment; drop those that were released."""
         arrays, row = self.arrays, 0
         for each in self._attachments:
             rows = slice(row, row + len(each.points))
@@ -168,7 +168,7 @@ class AttachmentList:
         for each in self._attachments:
             rows = range(begin, begin + len(each.points))
             if each.is_released:
-                self._let_go.append(each)
+                self._released.append(each)
                 arrays.released += attached_energy(arrays, body.positions, rows.start, rows.stop)
             else:
                 kept += rows

@@ -14,7 +14,7 @@ class FramePath:
     Args:
         times: When it is there, after the start [s], shape (n,), increasing, above 0.
         displacements: How far it is then from where it was at the start [m], shape (n, 3).
-        release_at: When what is held there is let go, after the start [s].
+        release_at: When what is held there is released, after the start [s].
 
     Raises:
         ValueError: the shapes do not fit, a number is not finite, or the times do not increase.

@@ -25,7 +25,7 @@ class Ligament(Attachment):
         area: Cross-section of all strands together [m2].
         toughness: Energy of cutting them [J/m2].
         damping: Of all of them together, along them [N s/m].
-        breaks_at: Force of all of them at which they let go [N].
+        breaks_at: Force of all of them at which they release the tissue [N].
 
     Raises:
         ValueError: a number is not finite, has the wrong sign, or is beyond `tissue.core.limits`.
@@ -36,7 +36,6 @@ class Ligament(Attachment):
         points: MaterialPoints,
         others: FloatArray,
         lengths: FloatArray,
-        *,
         stiffness: float,
         area: float,
         toughness: float,

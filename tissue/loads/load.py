@@ -74,13 +74,13 @@ class Loads:
             load.forces = each
 
     def add(self, load: Load) -> None:
-        """Let a load act."""
+        """Add a load, which acts from now on."""
         load.number = self._n_added
         self._n_added += 1
         self._loads.append(load)
 
     def remove(self, load: Load, nodal_forces: FloatArray) -> None:
-        """Let a load act no longer.
+        """End a load.
 
         Raises:
             ValueError: it does not act on this body, or was released before.

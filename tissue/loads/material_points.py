@@ -110,6 +110,23 @@ def points_of(body: Body, where: str | npt.ArrayLike) -> MaterialPoints:
     return _rest_points(body, np.atleast_2d(array.astype(np.float64)))
 
 
+def points_to_hold(body: Body, where: str | npt.ArrayLike | MaterialPoints) -> MaterialPoints:
+    """Return the points by which an attachment holds: of a region its nodes, else `points_of`.
+
+    Raises:
+        ValueError: no point is there, or one is outside the body.
+    """
+    if isinstance(where, MaterialPoints):
+        return where
+    region = np.asarray(where)
+    if not isinstance(where, str) and region.dtype != np.bool_:
+        return points_of(body, where)
+    mask = region_mask(body, where if isinstance(where, str) else region)
+    if not mask.any():
+        raise ValueError(f"no node is in the region {where!r}; take a larger one, or give points")
+    return points_of(body, np.flatnonzero(mask))
+
+
 def _skin_points(body: Body, mask: BoolArray, name: str) -> MaterialPoints:
     """Return the centroids of the faces of the skin in a region, each with its share of area."""
     tetrahedra = body.tetrahedra[: body.n_tetrahedra]

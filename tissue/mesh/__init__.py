@@ -6,14 +6,13 @@ In the order in which they are best read:
     faces             the faces that tetrahedra share, and the table of their outward nodes
     star              the tetrahedra around a node or an edge
     workspace         room for the nodes and tetrahedra that a cut adds
-    changes           what a cut step changed
+    changes           what a cut step changed, and what owners of arrays do then
     moved_nodes       the nodes that moved since a search asked last
     tetrahedron_grid  a grid of cells that list tetrahedra
     point_location    which tetrahedron holds a point, by that grid
     bounding_boxes    the box around the body, and boxes around its parts
     surface           the boundary triangles
     pieces            the connected pieces
-    body_queries      all that a user can ask of a body at any time
     cut_error         how far cut faces lie from the blade's path
     validation        a mesh that the engine can work with, or an error
     node_order        nodes in an order that the caches like

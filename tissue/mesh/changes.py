@@ -1,6 +1,6 @@
 """What a cut step changed in a mesh: nodes put on the sheet, tetrahedra changed, faces cut."""
 
-from typing import Final
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -54,6 +54,34 @@ class Change(Arrays):
     finished_area: FloatCell
     """The part of `area` that no blade cut: bridges that were finished [m2]
     (`tissue.cutting.finishing`)."""
+
+
+class ChangedMesh(NamedTuple):
+    """A mesh after a pass of a cut, and what the pass changed."""
+
+    body: Body
+    """The body as it is now."""
+    visits: Visits
+    """Scratch for searches."""
+    change: Change
+    """What the pass changed."""
+    nodes: IntArray
+    """Nodes of the tetrahedra that changed, each once, shape (n,)."""
+
+
+class Owner(Protocol):
+    """Owner of arrays that depend on the mesh: of rows for nodes or tetrahedra, or numbers of them.
+
+    All owners of a tissue stand in one list (`tissue.stepping.stages`).
+    """
+
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Update what depends on the tetrahedra that a pass of a cut changed."""
+        ...
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        ...
 
 
 def new_change() -> Change:

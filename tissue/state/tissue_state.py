@@ -39,21 +39,17 @@ RULES = StateRules(
     packages=frozenset({"tissue"}),
     kept=frozenset(
         {"Material", "BladeShape", "SolverSettings", "CutSettings", "Identity", "Spares"}
-        | {"Hierarchical", "SameTypes"}
+        | {"CheckedSteps", "Hierarchical", "SameTypes"}
     ),
     derived={
         "BladeInteraction._context": _none,
         "BladeInteraction._views": dict,
-        "System._context": _none,
+        "TissueModel._context": _none,
         "GlobalStepper._relaxation": _none,
         "StellarScheme._cut": _none,
-        "BodyQueries._chunks": _none,
+        "BodyChunks._nodes": _none,
     },
-    own=frozenset(
-        {"GlobalStepper._threads", "SavedBody._spares", "DrivenBody._stopped"}
-        | {"DrivenBody._is_changed", "RepeatedSteps._watch", "RepeatedSteps._step_log"}
-        | {"RepeatedSteps._n_repeated"}
-    ),
+    own=frozenset({"GlobalStepper._threads"}),
     structs=STRUCTS,
     made={
         kind.__name__: kind

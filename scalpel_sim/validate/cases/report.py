@@ -16,7 +16,7 @@ from scalpel_sim.validate.cases.expected import ExpectedCurve
 from scalpel_sim.validate.cases.runner import CaseRecord
 from scalpel_sim.validate.findings import FAIL, Check, Curve, Plot
 from scalpel_sim.validate.report import bounds_text, draw_plot, value_text
-from tissue import whole_file
+from tissue.support import whole_file
 
 TABLE_FILE, SUMMARY_FILE = "case.csv", "case.json"
 

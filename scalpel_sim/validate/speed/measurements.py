@@ -12,7 +12,8 @@ from msgspec.structs import asdict
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import versions
 from scalpel_sim.validate.speed.machine import describe_machine
-from tissue import FloatArray, whole_file
+from tissue import FloatArray
+from tissue.support import whole_file
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -9,7 +9,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
 from scalpel_sim.runs import console
 from scalpel_sim.runs.options import PrintOptions
-from tissue import cache_directory, n_compiled_kernels
+from tissue.support import cache_directory, n_compiled_kernels
 
 
 def test_it_prints_the_folder_that_holds_the_kernels(capsys):

@@ -17,7 +17,8 @@ from scalpel_sim.runs.warm_up import USUAL_SETS, KernelSet, compile_ahead, kerne
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from tests.processes import environment
-from tissue import block, cache_directory
+from tissue import block
+from tissue.support import cache_directory
 
 SMALL = KernelSet.of(SCENES["grid2"])
 """A set whose blade is a line."""

@@ -96,7 +96,7 @@ def test_all_arrays_whose_rows_are_gathered_have_padding_after_the_last():
         SPRINGS,
         solver=SolverSettings(relaxation="hierarchical"),
     )
-    body, stages = tissue._body, tissue._system.stages
+    body, stages = tissue._body, tissue._model.stages
     arrays = [body.rest, body.positions, body.velocities, new_trails(5).origins]
     arrays += [getattr(stages, name) for name in Stages.__annotations__]
     arrays += [room_for_points(7), grown(room_for_points(7), 9)]

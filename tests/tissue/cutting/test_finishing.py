@@ -22,8 +22,8 @@ def cut_to(y, has_left=True):
     tissue = Tissue(block(), gravity=(0.0, 0.0, 0.0))
     edges = np.array([[[MIDDLE, at, z] for z in (-0.01, 0.05)] for at in (-0.01, y)])
     forward = np.tile([0.0, 1.0, 0.0], (2, 1))
-    cut_along(tissue._incision, tissue._hooks, edges, forward, tissue.node_size)
-    tissue._incision.path.has_left = int(has_left)
+    cut_along(tissue._stages.incision, tissue._stages.hooks, edges, forward, tissue.node_size)
+    tissue._stages.incision.path.has_left = int(has_left)
     return tissue
 
 
@@ -31,8 +31,8 @@ def test_a_bridge_of_a_tenth_of_the_sheet_is_parted():
     """5 mm of 60 are left, an eleventh of the 55 that were cut: the flat strip is the least."""
     tissue = cut_to(0.055)
     before = tissue.snapshot()
-    tissue._end_incision()
-    change = tissue._incision.scheme.change
+    tissue._stages.end_incision()
+    change = tissue._stages.incision.scheme.change
     assert change.finished_area == pytest.approx(0.005 * HEIGHT, rel=1e-9)
     assert change.area == pytest.approx(DEPTH * HEIGHT, rel=1e-9)
     after = tissue.snapshot()
@@ -43,9 +43,9 @@ def test_a_bridge_of_a_tenth_of_the_sheet_is_parted():
 
 def test_a_bridge_of_a_third_of_the_sheet_stays():
     tissue = cut_to(0.045)
-    tissue._end_incision()
+    tissue._stages.end_incision()
     assert MOST_FINISHED < 0.015 / 0.045
-    assert tissue._incision.finished_area == 0.0
+    assert tissue._stages.incision.finished_area == 0.0
     assert tissue.n_pieces() == 1
 
 
@@ -57,32 +57,32 @@ def test_a_bridge_of_a_quarter_is_parted_where_the_edge_has_passed_through_all_t
 ):
     """11.5 mm of 60 are left, 24 % of what was cut."""
     tissue = cut_to(0.0485)
-    tissue._incision.path.is_through = is_through
-    tissue._incision.path.has_end_in = has_end_in
-    tissue._end_incision()
+    tissue._stages.incision.path.is_through = is_through
+    tissue._stages.incision.path.has_end_in = has_end_in
+    tissue._stages.end_incision()
     assert tissue.n_pieces() == pieces
 
 
 def test_a_bridge_of_a_third_stays_whatever_the_edge_has_passed():
     tissue = cut_to(0.045)
-    tissue._incision.path.is_through = 1
-    tissue._end_incision()
+    tissue._stages.incision.path.is_through = 1
+    tissue._stages.end_incision()
     assert MOST_PASSED < 0.015 / 0.045
     assert tissue.n_pieces() == 1
 
 
 def test_a_bridge_stays_where_the_blade_left_the_way_that_it_came():
     tissue = cut_to(0.055, has_left=False)
-    tissue._end_incision()
-    assert tissue._incision.finished_area == 0.0
+    tissue._stages.end_incision()
+    assert tissue._stages.incision.finished_area == 0.0
     assert tissue.n_pieces() == 1
 
 
 def test_nothing_is_finished_where_the_body_is_in_two():
     tissue = cut_to(0.07)
-    tissue._end_incision()
-    assert tissue._incision.finished_area == 0.0
-    assert tissue._incision.cut_area == pytest.approx(DEPTH * HEIGHT, rel=1e-9)
+    tissue._stages.end_incision()
+    assert tissue._stages.incision.finished_area == 0.0
+    assert tissue._stages.incision.cut_area == pytest.approx(DEPTH * HEIGHT, rel=1e-9)
     assert tissue.n_pieces() == 2
 
 
@@ -97,7 +97,7 @@ def test_a_cut_without_a_blade_finishes_nothing():
 def test_nodes_that_no_blade_passed_count_in_no_path_error():
     """These are the ten at the back, y = 60 mm: five in each lip."""
     tissue = cut_to(0.055)
-    tissue._end_incision()
+    tissue._stages.end_incision()
     body = tissue._body
     not_passed = np.flatnonzero(body.off_path[: body.n_nodes] < 0.0)
     np.testing.assert_array_equal(body.rest[not_passed, 1], [DEPTH] * 10)
@@ -122,8 +122,8 @@ def neighbour_across(body, t, f):
 def test_a_crumb_that_hangs_on_the_other_lip_is_not_cut_loose():
     """One tetrahedron of lip +1 is tied to lip -1, and to nothing else: its face is the least."""
     tissue = cut_to(0.07)
-    incision, (body, visits) = tissue._incision, tissue._mesh()
-    incision._cut_in_passes(incision.scheme.end, tissue._hooks)
+    incision, (body, visits) = tissue._stages.incision, tissue._stages.mesh()
+    incision._cut_in_passes(incision.scheme.end, tissue._stages.hooks)
     cut = incision.scheme._arrays(body, visits, incision.path)
     links, sheet = body.links, cut.sheet
     crumb, f = next(

@@ -26,7 +26,7 @@ def cut_through(scheme):
     for _ in range(20):
         tissue.step(None, FRAME)
     assert tissue.n_repeated_steps == 0  # for want of room is not for instability
-    assert len(tissue._incision.scheme.change.dirty) > 1
+    assert len(tissue._stages.incision.scheme.change.dirty) > 1
     return tissue.snapshot(), tissue.cut_report()
 
 

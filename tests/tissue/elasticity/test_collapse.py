@@ -258,4 +258,4 @@ def test_a_block_recovers_from_random_positions_and_its_account_closes(relaxatio
 
 def test_the_paper_s_relaxation_is_as_it_was():
     tissue = Tissue(ONE, SPRINGS, solver=SolverSettings(relaxation="hierarchical"))
-    assert tissue._system.elasticity.arrays.collapsing.modulus == 0.0
+    assert tissue._model.elasticity.arrays.collapsing.modulus == 0.0

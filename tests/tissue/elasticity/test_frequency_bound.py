@@ -43,7 +43,7 @@ def cut_mesh(seed: int) -> TetrahedralMesh:
 
 def updated_solid(tissue: Tissue) -> SolidBody:
     """Return the solid as the tissue updated it after the cuts."""
-    return SolidBody(tissue._body, tissue._system.elasticity.arrays.solid)
+    return SolidBody(tissue._body, tissue._model.elasticity.arrays.solid)
 
 
 @needs_speed
@@ -53,7 +53,7 @@ def test_8_the_bound_updated_after_cuts_is_slightly_above_the_highest_frequency(
     solid = updated_solid(tissue)
     ratio = solid.frequency() / highest_frequency(solid)
     assert 1.0 <= ratio <= LOOSEST_TIGHT_BOUND
-    assert solid.frequency() <= np.sqrt(tissue._system.elasticity.frequency_squared)
+    assert solid.frequency() <= np.sqrt(tissue._model.elasticity.frequency_squared)
 
 
 @needs_speed

@@ -23,7 +23,7 @@ LOW = 4000.0
 
 def solid_of(tissue):
     """Return the elements of a body."""
-    return tissue._system.elasticity.arrays.solid
+    return tissue._model.elasticity.arrays.solid
 
 
 def body_of(mass_scaling, relaxation="global", is_held=True, **damping):
@@ -111,7 +111,7 @@ def forces(tissue, positions):
     body, n = tissue._body, tissue.n_nodes
     body.positions[:n] = positions
     out = np.zeros_like(body.positions)
-    accelerations(tissue._system.context, out)
+    accelerations(tissue._model.context, out)
     return out[:n] * body.masses[:n, None]
 
 
@@ -186,7 +186,7 @@ def node_inside():
 
 def strained_bound(tissue):
     """Return a bound on the frequencies of a body as it is deformed, near the truth [1/s]."""
-    system, anything = tissue._system, StepLimit(allowed=0.0, added=0.0, n_steps=0)
+    system, anything = tissue._model, StepLimit(allowed=0.0, added=0.0, n_steps=0)
     squared = system.elasticity.strained_frequency_squared(system.body, system.visits, anything)
     return np.sqrt(squared)
 
@@ -215,7 +215,7 @@ def test_tissue_that_stiffens_as_it_is_stretched_gets_no_mass_for_it():
 
 def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_back():
     tissue = pulled_body(LEAST, [node_inside()])
-    body, elasticity = tissue._body, tissue._system.elasticity
+    body, elasticity = tissue._body, tissue._model.elasticity
     n, scaling = tissue.n_nodes, elasticity.arrays.scaling
     masses, bounds = body.masses[:n].copy(), elasticity.arrays.frequency_squared[:n].copy()
     strained_bound(tissue)
@@ -236,13 +236,13 @@ def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_ba
 
 def test_as_the_blade_leaves_no_node_has_mass_that_it_does_not_need_at_rest():
     tissue = body_of(LEAST)
-    was_engaged, interaction = False, tissue._system.interaction
+    was_engaged, interaction = False, tissue._model.interaction
     for sweep in strokes.sweeps(strokes.slanted(MESH)):
         tissue.step(sweep, strokes.DT)
         if was_engaged and not interaction.is_engaged:
             break  # later on lips that swing may need some again
         was_engaged = interaction.is_engaged
-    body, elastic, n = tissue._body, tissue._system.elasticity.arrays, tissue.n_nodes
+    body, elastic, n = tissue._body, tissue._model.elasticity.arrays, tissue.n_nodes
     assert elastic.scaling.largest > elastic.scaling.added
     got = body.added_masses[:n] > 0.0
     needed = elastic.solid.frequency_squared[:n][got]
@@ -261,7 +261,7 @@ def test_where_a_time_step_is_one_step_nodes_get_no_mass_between_cuts():
 @pytest.mark.parametrize("room", [1.0, 0.0], ids=["some", "none"])
 def test_a_node_that_gets_mass_keeps_its_momentum_and_its_lost_energy_is_counted(room):
     tissue = pulled_body(LEAST)
-    body, elastic, node = tissue._body, tissue._system.elasticity.arrays, node_inside()
+    body, elastic, node = tissue._body, tissue._model.elasticity.arrays, node_inside()
     body.velocities[node, :3] = 1.0, -2.0, 0.5
     elastic.scaling.most *= room
     mass, velocity = body.masses[node], body.velocities[node, :3].copy()

@@ -101,7 +101,7 @@ def cut_solid(seed):
     for i in range(2):
         kind = list(incisions.KINDS)[(seed + 3 * i) % len(incisions.KINDS)]
         tissue.incise(*incisions.incision(CUT, kind, seed + i))
-    return SolidBody(tissue._body, tissue._system.elasticity.arrays.solid)
+    return SolidBody(tissue._body, tissue._model.elasticity.arrays.solid)
 
 
 LOOSEST_STRAINED_BOUND = {"sheet": 1.3, "rod": 1.3, "sheared": 1.3, "crushed": 1.5}

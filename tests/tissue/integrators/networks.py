@@ -5,6 +5,7 @@ import numpy as np
 from tests import bodies
 from tests.tissue.kernels_of import Network, network_of
 from tissue import BoolArray, FloatArray, Hierarchical
+from tissue.blade.edge import NOWHERE
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.integrators.hierarchical.kernels import (
@@ -21,7 +22,6 @@ from tissue.integrators.hierarchical.node_rings import (
     search,
 )
 from tissue.integrators.hierarchical.stepper import ring_steps
-from tissue.tissue import NOWHERE
 
 FREE_FALL = Vec3(0.0, 0.0, -9.81)
 

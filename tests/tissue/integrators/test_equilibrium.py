@@ -31,7 +31,7 @@ def way_to_rest(tissue, seconds):
     """Return how far the nodes move in a time [s] over the largest displacement from rest."""
     settled = tissue.snapshot().positions
     sag = np.abs(settled - tissue._body.rest[: tissue.n_nodes]).max()
-    tissue._global_stepper.wake()
+    tissue._stages.global_stepper.wake()
     for _ in range(round(seconds / 1e-2)):
         tissue.step(None, 1e-2)
     return np.abs(tissue.snapshot().positions - settled).max() / sag

@@ -46,11 +46,11 @@ def test_motion_that_became_unstable_ends_with_an_error_and_can_be_read(method, 
 
 def bounds_in(tissue, n_frames):
     """Return how often the frequencies of the strained body are bounded in some frames."""
-    solid = tissue._system.elasticity.arrays.solid
+    solid = tissue._model.elasticity.arrays.solid
     before = solid.test
     for _ in range(n_frames):
         tissue.step(None, FRAME)
-    return tissue._system.elasticity.arrays.solid.test - before
+    return tissue._model.elasticity.arrays.solid.test - before
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -76,7 +76,7 @@ def test_a_body_that_was_cut_or_settled_is_bounded_again(method):
 def test_damping_acts_once_in_two_steps_unless_slivers_would_be_turned_round(factor, interval):
     """The rate of the uncut body times two steps is 0.45; that of its slivers a multiple of it."""
     tissue = Tissue(block((2, 2, 2)), DAMPED, solver=SolverSettings(relaxation="verlet"))
-    elastic, damping = tissue._system.elasticity.arrays, tissue._system.damping
+    elastic, damping = tissue._model.elasticity.arrays, tissue._model.damping
     seconds = 0.225 / damping.rate_uncut
     elastic.highest_of_dampers *= factor
     assert tissue.step(None, seconds).n_substeps == 1

@@ -57,7 +57,7 @@ def test_a_grid_that_is_built_anew_in_every_step_changes_nothing(blade):
     expected = fingerprint(usual, strokes.make(usual, stroke))
     results = []
     for sweep in strokes.sweeps(stroke):
-        other._system.interaction._grid = no_grid()
+        other._model.interaction._grid = no_grid()
         results.append(other.step(sweep, strokes.DT))
     assert fingerprint(other, results) == expected
 
@@ -68,5 +68,5 @@ def test_side_contacts_that_run_out_of_room_change_nothing(monkeypatch):
     expected = fingerprint(ample, strokes.make(ample, stroke))
     monkeypatch.setattr("tissue.blade.side_contact._FACES_AT_FIRST", 1)
     tight = body(blade=BladeShape())
-    assert len(tight._system.interaction.state.sides.face) == 1
+    assert len(tight._model.interaction.state.sides.face) == 1
     assert fingerprint(tight, strokes.make(tight, stroke)) == expected

@@ -16,7 +16,7 @@ def calm_body(relaxation, **options):
     solver = SolverSettings(relaxation=relaxation, audit=True)
     tissue = Tissue(CUBE, Material(), fixed=bodies.sides(CUBE), solver=solver, **options)
     tissue.settle()
-    tissue._global_stepper.wake()
+    tissue._stages.global_stepper.wake()
     for _ in range(400):
         result = tissue.step(None, strokes.DT)
     assert result.n_substeps == 0
@@ -64,7 +64,7 @@ def test_a_blade_that_touches_a_body_at_rest_meets_the_force_that_it_meets_in_mo
         found = []
         for _ in range(60):
             if is_waked:
-                tissue._global_stepper.wake()
+                tissue._stages.global_stepper.wake()
             edges = [
                 BladeSegment((0.015, at, low[2] - 0.01), (0.015, at, high[2] + 0.01), (0, 1, 0))
                 for at in (y, y + 1e-4)
@@ -116,7 +116,7 @@ def test_a_body_that_creeps_over_the_floor_is_not_at_rest():
 
 def test_a_sliver_that_swings_by_micrometres_does_not_keep_a_body_from_rest():
     tissue = calm_body("verlet")
-    tissue._global_stepper.wake()
+    tissue._stages.global_stepper.wake()
     free = np.flatnonzero(~tissue._body.fixed[: tissue.n_nodes])[0]
     for k in range(400):
         tissue._body.velocities[free] = [0.07 * tissue.node_size * (-1) ** k, 0.0, 0.0]

@@ -166,12 +166,12 @@ def test_the_frequency_bound_of_a_cut_body_holds_and_is_close(seed):
     mesh = bodies.jittered(3, seed)
     tissue = cut_body(mesh, strokes.slanted(mesh, lean=0.02 * seed))
     assert tissue.n_tetrahedra > len(mesh.tetrahedra)
-    body, springs = tissue._body, tissue._system.elasticity.arrays.springs
+    body, springs = tissue._body, tissue._model.elasticity.arrays.springs
     true = np.linalg.eigvalsh(dense_modes(body, springs))[-1]
     n = tissue.n_nodes
     bound = springs.frequency_squared[:n][~body.fixed[:n]].max()
     assert true <= bound <= LOOSEST_BOUND**2 * true
-    assert bound <= tissue._system.elasticity.frequency_squared
+    assert bound <= tissue._model.elasticity.frequency_squared
 
 
 def test_every_mode_is_stable_at_the_step_that_is_taken():

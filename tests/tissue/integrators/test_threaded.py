@@ -52,7 +52,7 @@ def cut_through(threads, case):
 def digest_of(tissue):
     """Return a digest of every bit of the state."""
     arrays = [np.ascontiguousarray(a).tobytes() for a in tissue.snapshot()]
-    dissipated = tissue._system.damping.dissipated
+    dissipated = tissue._model.damping.dissipated
     return hashlib.sha256(b"".join([*arrays, repr(dissipated).encode()])).hexdigest()
 
 
@@ -115,7 +115,7 @@ def test_a_thread_ends_with_its_body():
 def test_a_thread_sleeps_where_no_steps_are_taken():
     tissue = Tissue(MESH, SOLID, solver=two())
     tissue.step(None, 1e-3)
-    (worker,) = tissue._global_stepper._threads._workers
+    (worker,) = tissue._stages.global_stepper._threads._workers
     until = time.monotonic() + 5.0
     while not worker._is_asleep and time.monotonic() < until:
         time.sleep(1e-3)

@@ -5,7 +5,7 @@ import contextlib
 import pytest
 
 from tests.run_files import names_in
-from tissue import new_whole_file, remove_unfinished, whole_file
+from tissue.support import new_whole_file, remove_unfinished, whole_file
 
 
 def test_until_it_is_whole_the_old_file_is_there(tmp_path):

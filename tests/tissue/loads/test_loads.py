@@ -126,7 +126,7 @@ def test_each_side_of_a_cut_keeps_its_part_of_a_load():
     assert tissue.incise(edges, (0.0, 1.0, 0.0)) == pytest.approx(4e-4, rel=0.05)
     assert tissue.n_pieces() == 2
     tissue.step(None, DT)
-    body, of_nodes = tissue.snapshot(), tissue._system.stages.loads
+    body, of_nodes = tissue.snapshot(), tissue._model.stages.loads
     for k, piece in enumerate(tissue.pieces()):
         nodes = np.unique(body.tetrahedra[tissue.piece_of_tetrahedra() == k])
         is_own = (rest[:, 0] > x) == (piece.centre[0] > x)

@@ -39,7 +39,7 @@ from tissue.core.jit import SameTypes, kernel
 from tissue.core.three_vectors import Wrench
 from tissue.core.vec3 import vec3
 from tissue.mesh.body import Body, grown
-from tissue.mesh.changes import Change
+from tissue.mesh.changes import ChangedMesh
 from tissue.types import RigidContacts
 
 CONTACTS_AT_FIRST = 64
@@ -266,11 +266,11 @@ class GeomContact:
         friction = force - press[:, None] * normal
         return RigidContacts(point, normal, press, friction, np.zeros(len(geom)), geom)
 
-    def mesh_changed(self, body: Body, change: Change) -> None:
+    def mesh_changed(self, changed: ChangedMesh) -> None:
         """Take the faces that a pass of a cut made."""
         if self.geoms:
-            self._faces = with_room(self._faces, 4 * change.n_dirty)
-            update_changed_faces(self._faces, body, change)
+            self._faces = with_room(self._faces, 4 * changed.change.n_dirty)
+            update_changed_faces(self._faces, changed.body, changed.change)
             self._search.is_due = 1
             n_faces = len(self._faces.face)
             if len(self._search.touched) < n_faces:

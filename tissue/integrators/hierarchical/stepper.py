@@ -17,13 +17,14 @@ from tissue.integrators.hierarchical.kernels import (
     ring_frequencies,
 )
 from tissue.integrators.hierarchical.node_rings import grown_rings, new_rings
+from tissue.integrators.model import TissueModel
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.stability import SAFETY, largest_stable_step
 from tissue.integrators.step_context import Increment
-from tissue.integrators.system import System
 from tissue.integrators.unstable import not_finite
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 
 
@@ -64,12 +65,12 @@ class HierarchicalStepper:
         return self._options.far == "frozen"
 
     def relax(
-        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
     ) -> int:
         """Relax by an increment, stage by stage; return how many steps the focus took."""
         return relax_in_stages(self, system, blade, increment, has_blade)
 
-    def advance(self, system: System, increment: Increment) -> int:
+    def advance(self, system: TissueModel, increment: Increment) -> int:
         """Advance the motion by one frame; return how many steps the nodes of the focus took."""
         options, body, edge = self._options, system.body, increment.edge
         self._find_rings(system)
@@ -83,13 +84,13 @@ class HierarchicalStepper:
         note_moved(self._moved, rings.order, rings.n_found)
         return n
 
-    def _find_rings(self, system: System) -> None:
+    def _find_rings(self, system: TissueModel) -> None:
         """Find the rings around what the blade holds."""
         find_held(self._held, system.body, system.interaction.state)
         springs, last = system.elasticity.arrays.springs, self._options.rings + 1
         find_rings(self._rings, self._held, springs, last, self._scratch)
 
-    def _divide(self, system: System, span: float) -> tuple[int, IntArray]:
+    def _divide(self, system: TissueModel, span: float) -> tuple[int, IntArray]:
         """Return how many micro steps to take in `span` [s], and after how many each ring moves."""
         body, by_node = system.body, system.elasticity.arrays.frequency_squared
         highest, options = self._highest, self._options
@@ -103,16 +104,17 @@ class HierarchicalStepper:
             needed.append(span / (SAFETY * step))
         return ring_steps(options, needed)
 
-    def mesh_changed(self, nodes: IntArray) -> None:
+    def mesh_changed(self, changed: ChangedMesh) -> None:
         """Note nodes that may be new: they may have moved as others did."""
-        note_moved(self._moved, nodes, len(nodes))
+        note_moved(self._moved, changed.nodes, len(changed.nodes))
 
     def body_moved(self, body: Body) -> None:
         """Note every node."""
         note_moved(self._moved, np.arange(body.n_nodes), body.n_nodes)
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes."""
+        del n_tetrahedra
         self._rings = grown_rings(self._rings, n_nodes)
         self._held = grown_rings(self._held, n_nodes)
         self._scratch = np.zeros(n_nodes, np.int64)
@@ -141,7 +143,7 @@ def ring_steps(options: Hierarchical, needed: Sequence[float]) -> tuple[int, Int
 
 def relax_in_stages(
     integrator: HierarchicalStepper,
-    system: System,
+    system: TissueModel,
     blade: BladeContext,
     increment: Increment,
     has_blade: bool,
@@ -161,6 +163,7 @@ def relax_in_stages(
     interaction, edge = system.interaction, increment.edge
     faces_of = edge if has_blade else None
     interaction.update_faces(blade, integrator.moved, faces_of, increment.begin)
+    system.renew_context()
     n = integrator.advance(system, increment) if increment.span > 0.0 else 0
     if n > 0:
         system.relax_stress(increment.span)
@@ -171,10 +174,13 @@ def relax_in_stages(
     if has_blade:
         external, blade = system.stages.external, interaction.renewed(blade)
         interaction.update_anchors(blade, external, integrator.moved, edge, increment.end)
+        system.renew_context()
     return n
 
 
-def _update_bounds(integrator: HierarchicalStepper, system: System, blade: BladeContext) -> bool:
+def _update_bounds(
+    integrator: HierarchicalStepper, system: TissueModel, blade: BladeContext
+) -> bool:
     """Update the box around the body; return whether all positions are finite."""
     moving, body = integrator.moving, system.body
     if moving is None or 2 * moving[1] > body.n_nodes:

@@ -33,7 +33,7 @@ def kept(search, body):
 @pytest.mark.parametrize("make", [cut_block, pressed_blocks])
 def test_pairs_that_touch_are_kept_and_the_others_have_their_slack(make):
     tissue = make()
-    contact, body = tissue._system.contact, tissue._body
+    contact, body = tissue._model.contact, tissue._body
     n_touching, n_left_out = 0, 0
     for _ in range(100):
         tissue.step(None, strokes.DT)

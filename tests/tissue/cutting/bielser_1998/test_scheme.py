@@ -177,7 +177,7 @@ def test_tetrahedra_with_codes_that_are_not_in_the_table_are_left_whole_and_coun
     """Two opposite edges of a tetrahedron are cut, by cuts that do not touch."""
     mesh = bodies.unit_tetrahedron()
     tissue = uncut(mesh)
-    records = tissue._incision.scheme._records
+    records = tissue._stages.incision.scheme._records
     records.crossed_at[records.edges_of[0, [0, 4]]] = 0.5  # AB and CD
     tissue.incise([[(0.1, -1.0, 2.0), (0.1, -1.0, 3.0)], [(0.1, 2.0, 2.0), (0.1, 2.0, 3.0)]], Y)
     statistics = tissue.scheme_statistics()
@@ -190,10 +190,10 @@ def test_a_tetrahedron_is_split_once_the_blade_has_left_it():
     tissue = uncut(mesh, fixed=bodies.sides(mesh))
     for sweep in strokes.sweeps(strokes.upright(0.008, -0.005, 0.03, -0.01, 0.03)):
         tissue.step(sweep, strokes.DT)
-        records = tissue._incision.scheme._records
+        records = tissue._stages.incision.scheme._records
         split = records.first_child >= 0
         behind = mesh.positions[mesh.tetrahedra[split]][:, :, 1].max(axis=1)
-        anchors = tissue._system.interaction.state.anchors
+        anchors = tissue._model.interaction.state.anchors
         seeds = anchors.tetrahedron[anchors.state > 0]
         assert not split[[t for t in seeds if t < len(split)]].any()
         assert not len(behind) or behind.max() < sweep.t1.tip[1] + CELL
@@ -207,7 +207,7 @@ def test_springs_and_masses_are_those_of_the_split_mesh():
     tissue = uncut(mesh, material=SPRINGS)
     tissue.incise(upright(mesh, depth=0.5), Y)
     body, n = tissue._body, tissue.n_nodes
-    kept = [row(tissue._system.elasticity.arrays.springs, i) for i in range(n)]
+    kept = [row(tissue._model.elasticity.arrays.springs, i) for i in range(n)]
     masses = body.masses[:n].copy()
     from_scratch = springs_of(body, tissue.material.young_modulus)
     assert kept == [row(from_scratch, i) for i in range(n)]

@@ -118,7 +118,7 @@ def test_stress_is_the_cauchy_stress_of_a_slow_reference(law):
     mesh = bodies.jittered(3, 5)
     tissue = deformed(mesh, LAWS[law], moved(mesh), precision="double")
     f = naive_solid.gradients(mesh, moved(mesh))
-    first = naive_solid.stresses(mesh, moved(mesh), tissue._system.elasticity.arrays.solid.law)
+    first = naive_solid.stresses(mesh, moved(mesh), tissue._model.elasticity.arrays.solid.law)
     j = np.linalg.det(f)
     cauchy = first @ f.transpose(0, 2, 1) / j[:, None, None]
     nodal = averaged(mesh, cauchy, j * naive_solid.volumes(mesh))

@@ -1,0 +1,328 @@
+"""`TissueModel`: a body with everything that acts on it, as integrators advance it."""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.blade.blade_context import BladeContext
+from tissue.blade.edge import Edge
+from tissue.blade.interaction import BladeInteraction
+from tissue.blade.wrench import BladeReport
+from tissue.blade_shape import BladeShape
+from tissue.contact.geoms.geom import Geom
+from tissue.contact.geoms.geom_contact import GeomContact, no_geoms
+from tissue.contact.self_contact import SelfContact
+from tissue.core.thread_team import new_team
+from tissue.core.vec3 import Vec3
+from tissue.cut_settings import MeshMeasures
+from tissue.elasticity.elasticity import Elasticity
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.elasticity.mass_scaling import added_mass_shares
+from tissue.integrators.attachments import Attachments, no_attachments, strand_boxes
+from tissue.integrators.damping import Damping
+from tissue.integrators.stability import damping_rate, stable_step
+from tissue.integrators.stages import new_stages
+from tissue.integrators.step_context import StepContext
+from tissue.integrators.strands import report_strands
+from tissue.integrators.support_state import supports_at_rest
+from tissue.material import Material
+from tissue.mesh.body import Body, grown_body
+from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.cut_error import inverted_share, lowest_altitude
+from tissue.mesh.loose_pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
+from tissue.mesh.star import LARGEST_STAR, mean_node_size, no_visits
+
+INCREMENTS_TO_PIECES = 50
+"""Increments of steps from a change of the mesh until loose pieces are found again: 50 ms in a
+usual run. Finding them costs half a step of the integrator. Until then a piece that came
+loose is taken as held, and drag slows its fall."""
+
+
+class Numerics(NamedTuple):
+    """How the motion of a body is computed, as far as its arrays depend on it."""
+
+    mass_scaling: float | None
+    """Frequency above which nodes get mass [1/s]; see `Elasticity`."""
+    damps_between_steps: bool
+    """Whether damping acts between steps; if not, in every stage of them."""
+    is_single: bool
+    """Whether forces of tetrahedra are computed in single precision."""
+    moves_together: bool
+    """Whether all nodes are moved together; if not, as the paper does."""
+
+
+class TissueModel:
+    """A body and the owners of all arrays that take part in a step.
+
+    Args:
+        body: Nodes and tetrahedra; masses are written.
+        material: What it is made of.
+        gravity: Acceleration of free fall [m/s2].
+        blade: The body of the blade; None for a line that cuts.
+        floor: Height of a floor below the body [m]; None for no floor.
+        numerics: How its motion is computed.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        material: Material,
+        gravity: Vec3,
+        blade: BladeShape | None,
+        floor: float | None,
+        numerics: Numerics,
+    ) -> None:
+        self.body = body
+        self.surroundings = Surroundings(
+            gravity=gravity,
+            drag=float(material.viscous_damping),
+            retardation_time=float(material.retardation_time),
+        )
+        """Gravity and all damping."""
+        self.visits = no_visits(body.n_nodes, body.n_tetrahedra)
+        self.elasticity = Elasticity(
+            material,
+            body,
+            self.visits,
+            mass_scaling=numerics.mass_scaling,
+            is_single=numerics.is_single,
+            resists_collapse=numerics.moves_together,
+        )
+        around = np.zeros(LARGEST_STAR, dtype=np.int64)
+        self.node_size = mean_node_size(body, self.visits, around)
+        """Mean node size of the body before any cut [m]."""
+        self.interaction = BladeInteraction(blade, material, self.node_size, body.n_tetrahedra)
+        self.contact = SelfContact(
+            body,
+            self.node_size,
+            material.friction,
+            floor,
+            self.elasticity.frequency_squared,
+            acts=numerics.moves_together,
+        )
+        self.moves_together = numerics.moves_together
+        """Whether all nodes are moved together."""
+        self.stages = new_stages(len(body.rest))
+        self._set_damping(damps_between_steps=numerics.damps_between_steps)
+        self.supports = supports_at_rest()
+        """Whether fixed nodes move, and their work."""
+        self.attachments = no_attachments()
+        """Points that are tied to what moves from outside."""
+        self.has_strands = False
+        """Whether any of them is a strand, which the blade can cut."""
+        self.added_by_attachments = 0.0
+        """What they add to w^2 of the body at most [1/s2]."""
+        self.geoms = no_geoms(body, self.node_size)
+        """Contact with rigid geoms."""
+        self.loose = no_loose_pieces()
+        """The pieces that are not held, as they were found last."""
+        self.touched = np.zeros(len(body.rest), dtype=np.int64)
+        """Scratch: nodes that a pass of a cut touched."""
+        self._increments_to_pieces = 0
+        self._context: StepContext | None = None
+        self.find_loose_pieces()
+
+    def _set_damping(self, *, damps_between_steps: bool) -> None:
+        """Divide damping into that in the stages of a step, and that between steps."""
+        surroundings = self.surroundings
+        undamped = surroundings.replaced(drag=0.0, retardation_time=0.0)
+        between = surroundings if damps_between_steps else undamped
+        self._in_stages = undamped if damps_between_steps else surroundings
+        self.damping = Damping(
+            interval=1,
+            owed=0.0,
+            dissipated=0.0,
+            is_counted=0,
+            rate_uncut=damping_rate(self.elasticity.arrays, surroundings),
+            retardation_time=between.retardation_time,
+            drag=between.drag,
+        )
+        """The damping that acts between steps, and what it has dissipated."""
+
+    @property
+    def context(self) -> StepContext:
+        """The arrays as one struct, which stays until an owner replaces its own."""
+        context = self._context
+        if context is None:
+            self._context = context = StepContext(
+                body=self.body,
+                elastic=self.elasticity.arrays,
+                blade=self.interaction.state,
+                contacts=self.contact.forces,
+                geoms=self.geoms.arrays,
+                surroundings=self._in_stages,
+                damping=self.damping,
+                supports=self.supports,
+                attachments=self.attachments,
+                loose=self.loose,
+                stages=self.stages,
+                visits=self.visits,
+                team=new_team(),
+            )
+        return context
+
+    def renew_context(self) -> None:
+        """Forget the struct of all arrays where an owner has replaced its own.
+
+        It follows each call that may have replaced arrays: `context` is used in every step.
+        """
+        context = self._context
+        if context is not None and not (
+            context.body is self.body
+            and context.elastic is self.elasticity.arrays
+            and context.blade is self.interaction.state
+            and context.contacts is self.contact.forces
+            and context.geoms is self.geoms.arrays
+            and context.stages is self.stages
+            and context.attachments is self.attachments
+            and context.loose is self.loose
+        ):
+            self._context = None
+
+    @contextmanager
+    def without_drag(self) -> Iterator[None]:
+        """Take drag away for a while; what damping dissipates then is not counted."""
+        in_stages, damping = self._in_stages, self.damping
+        self._in_stages = in_stages.replaced(drag=0.0)
+        self.damping = damping.replaced(drag=0.0)
+        self._context = None
+        try:
+            yield
+        finally:
+            self._in_stages, self.damping, self._context = in_stages, damping, None
+
+    def relax_stress(self, seconds: float) -> None:
+        """Relax the stress of the tissue where it is, for that time [s] or for ever (inf)."""
+        if self.elasticity.relaxes:
+            # Imported late: kernels that are not used cost no start.
+            from tissue.integrators.stress_relaxation import relax_stress
+
+            relax_stress(self.context, seconds)
+
+    def find_contacts(self, seconds: float, room: float = math.inf) -> None:
+        """Find the contacts that act as forces in a time step of that length [s].
+
+        `room`: what may be added to w^2 of the body without another step [1/s2].
+        """
+        elasticity = self.elasticity
+        by_node, highest = elasticity.arrays.frequency_squared, elasticity.frequency_squared
+        self.contact.prepare(self.body, by_node, highest, room, seconds)
+        self.renew_context()
+
+    def touch(
+        self,
+        geoms: Sequence[Geom],
+        origins: npt.ArrayLike | None = None,
+        rotations: npt.ArrayLike | None = None,
+    ) -> GeomContact:
+        """Touch these rigid geoms from now on, and no others; return the contact.
+
+        See `GeomContact` for the arguments.
+        """
+        self.geoms = GeomContact(geoms, self.body, self.node_size, origins, rotations)
+        self.renew_context()
+        return self.geoms
+
+    def find_geom_contacts(self, seconds: float) -> None:
+        """Find the contacts with geoms in a time step of that length [s]."""
+        self.geoms.begin_step(self.body, seconds)
+        if self.geoms.geoms:
+            self.renew_context()
+
+    def take_attachments(
+        self, attachments: Attachments, has_strands: bool, added_frequency_squared: float
+    ) -> None:
+        """Take points that are tied to what moves from outside.
+
+        Args:
+            attachments: Their arrays.
+            has_strands: Whether any is a strand, which the blade can cut.
+            added_frequency_squared: What they add to w^2 of the body at most [1/s2].
+        """
+        self.attachments, self.has_strands = attachments, has_strands
+        self.added_by_attachments = added_frequency_squared
+        self.renew_context()
+
+    def replace_edge(self, length: float) -> None:
+        """Release the tissue, and use an edge of another length [m]; 0 for no edge."""
+        self.interaction.replace_edge(length, self.body)
+        self.renew_context()
+
+    def with_blade_room(self, outcome: int, blade: BladeContext) -> BladeContext:
+        """Return what searches of the blade work on with room; see `BladeInteraction.with_room`."""
+        blade = self.interaction.with_room(outcome, blade)
+        self.renew_context()
+        return blade
+
+    def find_loose_pieces(self) -> None:
+        """Find the pieces that are not held; where they are those of before, keep the struct.
+
+        With another one the next saved state looks up where all of the memory is, in a millisecond.
+        """
+        if self.surroundings.drag > 0.0:
+            found = loose_pieces_of(self.body)
+            if not are_same_pieces(found, self.loose):
+                self.loose = found
+                self.renew_context()
+        self._increments_to_pieces = 0
+
+    def find_new_loose_pieces(self) -> None:
+        """Find them again some increments after the mesh changed, as it may change in each."""
+        if self._increments_to_pieces > 0:
+            self._increments_to_pieces -= 1
+            if self._increments_to_pieces == 0:
+                self.find_loose_pieces()
+
+    def mesh_changed(self, changed: ChangedMesh) -> None:
+        """Find loose pieces again some increments later."""
+        del changed
+        if self._increments_to_pieces == 0:
+            self._increments_to_pieces = INCREMENTS_TO_PIECES
+
+    def incision_ended(self) -> None:
+        """Update what is looked at once the blade has left an incision."""
+        self.elasticity.return_mass(self.body)
+        self.contact.incision_ended(self.body)
+        self.find_loose_pieces()
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra in the body, and in scratch."""
+        self.body = grown_body(self.body, n_nodes, n_tetrahedra)
+        self.visits = no_visits(n_nodes, n_tetrahedra)
+        self.stages = new_stages(n_nodes)
+        self.touched = np.zeros(n_nodes, dtype=np.int64)
+
+    def report(self, blade: BladeContext, edge: Edge, dt: float) -> BladeReport:
+        """Return what a time step of `dt` [s] came to for the blade; bounds hold strands too."""
+        if not self.has_strands:
+            return self.interaction.report(blade, edge, dt)
+        strands, positions = self.attachments, self.body.positions
+        found = self.interaction.report(
+            blade, edge, dt, lambda report: report_strands(report, strands, positions, edge)
+        )
+        boxes = strand_boxes(strands, positions)
+        low = boxes[:, 0].min(axis=0, initial=math.inf)
+        high = boxes[:, 1].max(axis=0, initial=-math.inf)
+        bounds = (np.minimum(found.bounds[0], low), np.maximum(found.bounds[1], high))
+        return found._replace(bounds=np.stack(bounds))
+
+    def measures(self, method: int) -> MeshMeasures:
+        """Return what bounds the time step of the body now.
+
+        `method`: a constant of `tissue.integrators.stability`.
+        """
+        squared = self.elasticity.frequency_squared
+        shares = added_mass_shares(self.elasticity.arrays.scaling, self.body)
+        return MeshMeasures(
+            n_tetrahedra=self.body.n_tetrahedra,
+            altitude=lowest_altitude(self.body),
+            frequency=math.sqrt(squared),
+            time_step=stable_step(method, self.elasticity.arrays, squared, self.surroundings),
+            added_mass=shares.now,
+            most_added_mass=shares.largest,
+            inverted=inverted_share(self.body),
+        )

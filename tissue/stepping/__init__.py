@@ -1,0 +1,1 @@
+"""The stages of a step, and what watches them."""

@@ -1,0 +1,350 @@
+"""`StepStages`: the stages of a time step, in the order in which `advance` lists them."""
+
+import math
+from time import perf_counter
+
+import numpy as np
+
+from tissue.blade.blade_context import NOT_ENGAGED, BladeContext
+from tissue.blade.edge import NOWHERE, Edge
+from tissue.blade.lazy_result import LazyResult
+from tissue.blade.path_tracing import forget_path
+from tissue.blade.prescribed_cut import cut_along
+from tissue.blade.sweep_checks import edge_of, edge_or_error
+from tissue.blade.toughness import expect_toughness_in_range
+from tissue.body_view import BodyChunks, bounds_of_body
+from tissue.core.array_types import FloatArray
+from tissue.core.three_vectors import BladeSweep
+from tissue.cut_settings import CutReport
+from tissue.cutting.incision import CutHooks, Incision
+from tissue.integrators.attachments import strand_boxes
+from tissue.integrators.equilibrium import SETTLED, settle
+from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
+from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.integrator import Integrator
+from tissue.integrators.model import TissueModel
+from tissue.integrators.step_context import Increment
+from tissue.integrators.step_length import expect_few_steps
+from tissue.loads.handles import Handles
+from tissue.material import Material
+from tissue.mesh.body import Body
+from tissue.mesh.bounding_boxes import write_bounds
+from tissue.mesh.changes import ChangedMesh, Owner, touched_nodes
+from tissue.mesh.cut_error import path_error
+from tissue.mesh.star import Visits
+from tissue.mesh.workspace import room_for_a_pass
+from tissue.solver_settings import SolverSettings
+from tissue.stepping.energy_audit import Audit
+from tissue.types import Chunks, StageTimes, StepResult
+
+
+class StepStages:
+    """The stages of the steps of one tissue. All that its next step depends on is here.
+
+    Args:
+        model: The body, and all that acts on it.
+        material: What it is made of.
+        incision: Brings the path of the blade into the mesh.
+        global_stepper: Moves all nodes together, at least where the body settles.
+        integrator: Moves the nodes in a step; it may be the same.
+        audit: The account of the energy.
+        slit_reach: Distance from a cut face up to which a point is in the slit [m]
+            (`tissue.blade.engagement.is_in_slit`).
+    """
+
+    def __init__(
+        self,
+        model: TissueModel,
+        material: Material,
+        incision: Incision,
+        global_stepper: GlobalStepper,
+        integrator: Integrator,
+        audit: Audit,
+        slit_reach: float,
+    ) -> None:
+        self.model = model
+        self.material = material
+        self.incision = incision
+        self.global_stepper = global_stepper
+        self.integrator = integrator
+        self.audit = audit
+        self.handles = Handles(model)
+        """Loads, attachments and supports."""
+        self.chunks = BodyChunks()
+        """Boxes that together hold the body."""
+        self._slit_reach = slit_reach
+        self._bounds = bounds_of_body(model.body)
+        self._at_first = model.measures(global_stepper.method.limit)
+        self.make_room()
+        audit.begin(model, NOWHERE)
+
+    @property
+    def owners(self) -> tuple[Owner, ...]:
+        """All that follows changes of the mesh, and grows with it, in the order in which it does.
+
+        The model is the first: the others see its new body.
+        """
+        model = self.model
+        return (
+            model,
+            model.elasticity,
+            model.interaction,
+            model.contact,
+            model.geoms,
+            self.integrator,
+            self.handles,
+            self.chunks,
+            self.audit,
+            self.incision,
+        )
+
+    def advance(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+        """Do the stages of a step; see `tissue.Tissue.step`."""
+        has_blade = sweep is not None
+        edge = NOWHERE if sweep is None else edge_of(sweep)
+        dt = _checked_time_step(dt)
+        model, incision, handles = self.model, self.incision, self.handles
+        expect_few_steps(model, self.global_stepper.method.limit, dt)
+        travel = edge.travel if has_blade else 0.0
+        n = incision.n_increments(travel)
+        self._begin_step(sweep, edge, dt)
+        handles.begin_step(dt)
+        n = max(n, model.geoms.n_increments) * self.global_stepper.refinement
+        n_substeps = 0
+        collision = topology = relaxation = 0.0  # wall times
+        now = perf_counter()
+        for i in range(n):
+            increment, begun = Increment(edge, dt, i / n, (i + 1) / n), now
+            # RX, relaxation: forces, contact, motion, slip of the blade
+            n_substeps += self._relax(increment, has_blade)
+            relaxed = perf_counter()
+            # CD, collision detection: path, active tetrahedra, crossed edges
+            is_crossed = has_blade and self._detect(increment)
+            detected = perf_counter()
+            # GC, geometric changes: subdivision, separation
+            if is_crossed:
+                incision.cut(self.hooks)
+            elif has_blade and not model.interaction.is_engaged:
+                self.end_incision()
+            now = perf_counter()
+            relaxation += relaxed - begun
+            collision += detected - relaxed
+            topology += now - detected
+        if has_blade and incision.has_rested(travel, dt):
+            incision.open_to_edge(self.hooks)
+            topology += perf_counter() - now
+        stage_times = StageTimes(collision, topology, relaxation)
+        handles.end_step(dt)
+        return self._result(edge, has_blade, dt, n_substeps, stage_times)
+
+    def _begin_step(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
+        """Take the edge, and start the totals of a step.
+
+        Raises:
+            ValueError: no blade can move so, or it does not fit the mesh.
+        """
+        model = self.model
+        interaction = model.interaction
+        if sweep is None:
+            self.take_edge(None)
+        elif interaction.is_other_edge(edge.length):
+            edge_or_error(sweep)  # before the tissue is released
+            self.take_edge(edge)
+        if not interaction.begin_step(model.body, edge, dt, sweep is None):
+            assert sweep is not None
+            edge_or_error(sweep)  # it takes numbers whose squares are not finite
+            interaction.begin_step(model.body, edge, dt, True)
+        interaction.edge_now = (edge, 0.0)
+        model.contact.begin()
+
+    def _relax(self, increment: Increment, has_blade: bool) -> int:
+        """Relax by an increment; return the substeps that it took."""
+        model, handles, audit = self.model, self.handles, self.audit
+        before, is_driven = 0.0, handles.act
+        if is_driven:
+            if handles.keep_awake:
+                self.global_stepper.wake()
+            before = handles.begin_increment(increment, has_blade)
+        n = self.integrator.relax(model, self._blade_context, increment, has_blade)
+        if is_driven:
+            audit.work_of_loads += handles.end_increment(before, increment)
+        audit.lost_at_geoms += model.geoms.arrays.dissipated
+        if n > 0:
+            audit.forget()
+        model.interaction.edge_now = (increment.edge, increment.end)
+        return n
+
+    def _detect(self, increment: Increment) -> bool:
+        """Trace the path of the edge through the material; return whether it crossed anything."""
+        model, incision = self.model, self.incision
+        travel = model.interaction.trace(self._blade_context, increment.edge, increment.end)
+        if travel == NOT_ENGAGED:
+            return False
+        incision.has_begun = True
+        return incision.detect(model.body, model.visits, travel)
+
+    def end_incision(self) -> None:
+        """Resolve what the blade left uncut; the next contact begins another incision."""
+        if self.incision.has_begun:
+            self.incision.end(self.hooks)
+            self.model.incision_ended()
+            forget_path(self.incision.path)
+
+    def _result(
+        self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, stage_times: StageTimes
+    ) -> StepResult:
+        """Return what the step did."""
+        model, scheme = self.model, self.incision.scheme
+        report = model.report(self._blade_context, edge, dt)
+        amounts, change = report.amounts, scheme.change
+        return LazyResult.of(
+            report,
+            model.geoms if model.geoms.act else None,
+            int(amounts.n_tetrahedra),
+            int(amounts.n_nodes),
+            scheme.n_active,
+            int(amounts.tip_tetrahedron) if has_blade else -1,
+            amounts.anchored_length,
+            change.area,
+            change.finished_area,
+            amounts.work_of_blade,
+            amounts.work_of_cutting,
+            n_substeps,
+            model.contact.report(dt),
+            stage_times,
+            self.audit.energies(model, edge),
+        )
+
+    @property
+    def _blade_context(self) -> BladeContext:
+        model = self.model
+        where = (self.incision.path, self._bounds, self._slit_reach)
+        return model.interaction.context(model.body, model.visits, *where)
+
+    # between steps
+
+    def chunks_now(self) -> Chunks:
+        """Return boxes that together hold the body and its ligaments.
+
+        After a cut the body is divided again, which takes some 0.3 us a tetrahedron; else it costs
+        one pass over the nodes.
+        """
+        model, found = self.model, self.chunks.boxes(self.model.body)
+        if not model.has_strands:
+            return found
+        boxes = strand_boxes(model.attachments, model.body.positions)
+        return found._replace(boxes=np.concatenate((found.boxes, boxes))) if len(boxes) else found
+
+    def cut_report(self, solver: SolverSettings) -> CutReport:
+        """Return what cuts did so far; see `tissue.Tissue.cut_report`."""
+        model = self.model
+        error = path_error(model.body)
+        return CutReport(
+            n_cut_nodes=error.n_nodes,
+            path_error_mean=error.mean,
+            path_error_largest=error.largest,
+            node_size=model.node_size,
+            guard=0.0 if solver.scheme == "paper" else solver.cut.guard * model.node_size,
+            initial=self._at_first,
+            now=model.measures(self.global_stepper.method.limit),
+        )
+
+    def cut_along(self, rows: FloatArray, directions: FloatArray) -> float:
+        """Cut along a surface; return the area cut [m2].
+
+        Args:
+            rows: Places of the edge in the body at rest [m], shape (n_places, n_points, 3).
+            directions: Unit vectors in which it faces, shape (n_places, 3).
+        """
+        self.end_incision()
+        incision, blade_path = self.incision, self.incision.path
+        before = incision.cut_area
+        cut_along(incision, self.hooks, rows, directions, self.model.node_size)
+        self.end_incision()
+        incision.path = blade_path
+        return incision.cut_area - before
+
+    def settle(self, floor: float | None) -> int:
+        """Relax to equilibrium; return the steps it took. See `tissue.Tissue.settle`.
+
+        `floor`: height of the floor below the body [m]; None for no floor.
+        """
+        model, stepper = self.model, self.global_stepper
+        self.handles.stop()
+        support = support_of(model, self.material, floor)
+        found = settle(stepper, model, NOWHERE, support)
+        self.integrator.body_moved(model.body)
+        if found.is_at_rest:
+            stepper.let_rest(model)
+        else:
+            warn_of_motion(model, found.n_steps, found.accelerations, support, SETTLED)
+        write_bounds(model.body, self._bounds)
+        self.audit.begin(model, NOWHERE)
+        return found.n_steps
+
+    def take_edge(self, edge: Edge | None) -> None:
+        """Take the edge of this blade; another blade, or none, releases the tissue."""
+        length = 0.0 if edge is None else edge.length
+        model = self.model
+        interaction = model.interaction
+        if interaction.is_other_edge(length):
+            if edge is not None:
+                interaction.expect_usable_edge(length)
+                expect_toughness_in_range(self.material, model.node_size)
+            self.end_incision()
+            model.replace_edge(length)
+            self.incision.take_edge(interaction.n_samples)
+
+    # changes of the mesh
+
+    @property
+    def hooks(self) -> CutHooks:
+        """Calls of the incision while it cuts."""
+        return CutHooks(self._before_cut, self._after_pass, self._after_cut, self.mesh)
+
+    def mesh(self) -> tuple[Body, Visits]:
+        """Return the body as it is now, and scratch for searches."""
+        return self.model.body, self.model.visits
+
+    def _before_cut(self) -> None:
+        self.audit.before_cut(self.model, *self.model.interaction.edge_now)
+
+    def _after_pass(self) -> None:
+        """Update what depends on the tetrahedra that changed, and make room for another pass."""
+        model, change = self.model, self.incision.scheme.change
+        if change.n_dirty == 0 and not change.is_full:
+            return
+        n = touched_nodes(model.body, change, model.visits, model.touched)
+        if n:
+            changed = ChangedMesh(model.body, model.visits, change, model.touched[:n])
+            for owner in self.owners:
+                owner.mesh_changed(changed)
+            model.renew_context()
+        self.make_room()
+
+    def _after_cut(self) -> None:
+        self.audit.after_cut(self.model, *self.model.interaction.edge_now)
+
+    def make_room(self) -> None:
+        """Make room for the next pass of a cut: arrays double when they are nearly full."""
+        room = room_for_a_pass(self.model.body, self.incision.scheme.doubled_nodes)
+        if room is not None:
+            for owner in self.owners:
+                owner.grow(*room)
+            self.model.renew_context()
+
+    def make_more_room(self, lacking: int) -> None:
+        """Make twice the room for what lacked it in a cut; see `NoRoomError`."""
+        self.incision.scheme.make_room(lacking)
+        self.make_room()
+
+
+def _checked_time_step(dt: float) -> float:
+    """Return a time step [s] as a float: kernels that are called with one take no other number.
+
+    Raises:
+        ValueError: it is not finite, or negative.
+    """
+    if not (math.isfinite(dt) and dt >= 0.0):
+        raise ValueError(f"dt is {dt} s; it must be finite and not negative")
+    return float(dt)
