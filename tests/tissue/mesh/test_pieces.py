@@ -66,16 +66,6 @@ def test_a_spinning_piece_has_the_given_velocities(cut):
     np.testing.assert_allclose(small.inertia, small.inertia.T)
 
 
-def test_the_inertia_of_a_piece_is_that_of_its_nodes(cut):
-    body, piece = cut.snapshot(), cut.pieces()[0]
-    nodes = np.unique(body.tetrahedra[cut.piece_of_tetrahedra() == 0])
-    expected = np.zeros((3, 3))
-    for node in nodes:
-        r = body.positions[node] - piece.centre
-        expected += body.masses[node] * (r @ r * np.eye(3) - np.outer(r, r))
-    np.testing.assert_allclose(piece.inertia, expected, rtol=1e-9)
-
-
 def test_equal_pieces_are_in_the_order_of_their_tetrahedra():
     two = bodies.unit_tetrahedron()
     mesh = two._replace(

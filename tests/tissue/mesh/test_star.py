@@ -47,9 +47,3 @@ def test_node_size_is_the_smallest_altitude_around(mesh, around):
     sizes = [naive.node_size(mesh.positions, mesh.tetrahedra, node) for node in range(n_nodes)]
     assert [node_size(body, visits, k, out) for k in range(n_nodes)] == pytest.approx(sizes)
     assert mean_node_size(body, visits, out) == pytest.approx(np.mean(sizes))
-
-
-def test_a_new_search_does_not_depend_on_the_last(mesh, around):
-    body, visits, out = around
-    first = star(body, visits, 0, body.node_tetrahedron[0], out)
-    assert star(body, visits, 0, body.node_tetrahedron[0], out) == first
