@@ -258,15 +258,6 @@ def test_a_run_that_starts_before_its_server_waits_for_it_and_says_so(monkeypatc
     assert failed.startswith(f"error: no tissue is served at {address}")
 
 
-def test_an_unreachable_server_is_a_failed_run(files, monkeypatch, capsys):
-    monkeypatch.setattr("scalpel_sim.cli.run_setup.SERVER_PATIENCE", 0.0)
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{unused.getsockname()[1]}"
-    assert command_line(["run", "--connect", address]) == 1
-    assert address in only_line(capsys.readouterr().err)
-
-
 @pytest.mark.parametrize("command", ["serve", "view"])
 def test_a_port_in_use_is_a_failed_run(command, files, capsys):
     with socket.socket() as taken:

@@ -236,12 +236,6 @@ def test_a_key_saves_the_picture_with_heading_and_readings_under_scene_and_time(
     assert differs[:70].any() and differs[-230:, :380].any()
 
 
-def test_the_button_saves_a_picture_too(tab):
-    with tab.expect_download() as download:
-        tab.click("#save-picture")
-    assert saved(download.value).std() > 5.0
-
-
 def test_the_scale_is_in_the_picture(tab):
     def corner():
         with tab.expect_download() as download:

@@ -89,6 +89,7 @@ def test_the_live_page_is_sent_with_its_policy():
         assert f"connect-src 'self' ws://{viewer.url.split('/')[2]};" in policy
         assert policy.endswith("frame-ancestors 'none'")
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert answer.headers["X-Frame-Options"] == "DENY"
         assert answer.headers["Referrer-Policy"] == "no-referrer"
 
 
