@@ -35,19 +35,6 @@ def classical(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
     return x, v
 
 
-def two_levels(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
-    """Take one step of the classical method, written separately for positions and velocities.
-
-    It has four stage positions, not three. The stages of the velocities are substituted into those
-    of the positions; this gives the terms in h^2, which the paper calls correction terms.
-    """
-    a1 = a(x, v)
-    a2 = a(x + h / 2 * v, v + h / 2 * a1)
-    a3 = a(x + h / 2 * v + h**2 / 4 * a1, v + h / 2 * a2)
-    a4 = a(x + h * v + h**2 / 2 * a2, v + h * a3)
-    return x + h * v + h**2 / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-
-
 def three_stages(a: Acceleration, x: FloatArray, v: FloatArray, h: float, c: float) -> tuple:
     """Take one step of the Nystroem method of 4th order with three stages, the second at `c`.
 

@@ -28,11 +28,6 @@ def shares(*cuts, crumb=0.0):
     return np.sort(pieces.volumes()) / VOLUME
 
 
-def test_the_parts_fill_the_box():
-    assert PARTS.volumes.sum() == pytest.approx(VOLUME, rel=1e-12)
-    assert len(PARTS.volumes) == 64 * len(block((2, 2, 2)).tetrahedra)
-
-
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("at", [0.5, 0.25, 0.3171])
 def test_a_plane_makes_two_pieces_of_its_shares_of_the_box(axis, at):
@@ -57,8 +52,3 @@ def test_a_crumb_stays_with_the_side_that_it_touches_most():
     slab, half = across(0, 0.25 * SIDE), across(1, 0.5 * SIDE)
     assert len(shares(slab, half, crumb=0.1)) == 4
     assert len(shares(slab, half, crumb=0.2)) == 3
-
-
-def test_a_cut_that_is_made_again_changes_nothing():
-    cut = across(0, 0.3171 * SIDE)
-    np.testing.assert_array_equal(shares(cut, cut), shares(cut))

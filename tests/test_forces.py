@@ -163,11 +163,6 @@ def test_slicing_lowers_the_normal_force_as_theory_says(slice_ratio):
     assert -run.steady(axis=2) == pytest.approx(slice_ratio * pressing, abs=0.05 * pressing)
 
 
-def test_toughness_rises_with_the_speed_of_the_edge():
-    run = Run(upright(0.1), toughness=10.0, toughness_exponent=0.5, toughness_speed=0.1)
-    assert run.steady() == pytest.approx(2.0 * 10.0 * run.anchored(), rel=0.05)
-
-
 def test_a_blunt_edge_costs_twice_its_radius_times_the_work_to_rupture():
     blunt = BladeShape(thickness=1e-5, edge_radius=50e-6)
     run = Run(upright(), blade=blunt, work_to_rupture=1e5)
@@ -360,21 +355,3 @@ def test_an_audit_of_a_motion_that_cannot_be_accounted_for_is_refused():
     with pytest.raises(ValueError, match="audit"):
         solver = SolverSettings(audit=True, relaxation="hierarchical")
         Tissue(block((2, 2, 2), SIZE), SPRINGS, solver=solver)
-
-
-@pytest.mark.parametrize("relaxation", ["global", "verlet"])
-def test_an_audit_changes_nothing(relaxation):
-    poses = upright()[:300]
-    with_audit = Run(poses, blade=SCALPEL, relaxation=relaxation).tissue.snapshot()
-    mesh = block((8, 8, 4), SIZE)
-    without = Tissue(
-        mesh,
-        Material(**SOFT),
-        fixed=sides(mesh),
-        gravity=NO_GRAVITY,
-        blade=SCALPEL,
-        solver=SolverSettings(relaxation=relaxation),
-    )
-    for a, b in itertools.pairwise(poses):
-        without.step(BladeSweep(a, b), DT)
-    np.testing.assert_array_equal(with_audit.positions, without.snapshot().positions)

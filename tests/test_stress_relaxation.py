@@ -264,12 +264,6 @@ def test_the_same_bits_on_one_and_two_threads():
     assert found[0][1] == found[1][1]
 
 
-def test_without_a_series_nothing_is_kept():
-    elastic = Material(law="neo_hookean", poisson_ratio=0.45)
-    solid = Tissue(block((2, 2, 2)), elastic)._system.elasticity.arrays.solid
-    assert len(solid.relaxed) == len(solid.relaxed_terms) == 0
-
-
 def test_a_body_pressed_flat_and_let_go_comes_to_rest():
     """R of the flat body is far from its stress when it springs back; the step stays stable."""
     mesh: TetrahedralMesh = block((4, 4, 4), (0.04, 0.04, 0.04))
