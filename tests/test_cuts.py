@@ -1,8 +1,5 @@
 """Whole cuts: a blade without an arm passes through a body and leaves a sound mesh."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,7 +7,7 @@ from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from tests import bodies, soundness, strokes
-from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe, read_mesh
+from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe
 
 CUBE = (0.04, 0.04, 0.04)
 
@@ -60,22 +57,15 @@ def test_an_organ_falls_into_two_sound_pieces(stroke):
     expect_sound(before, tissue, pieces=2)
 
 
-FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
-FILES = {  # file to its approximate unit of length [m]
-    "bullet_banana.vtk": 0.1,
-    "sofa_liver.msh": 0.05,
-    "sofa_truthcylinder1.msh": 0.01,
-    "sofaenv_tissue_volume.msh": 1.0,
-}
 EXTENT = 0.2
 """Longest side of the scaled third-party meshes [m]: twice an organ's, as they are coarse."""
 
 
-@pytest.mark.skipif(not FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
+@pytest.mark.skipif(not bodies.FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
 @pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
-@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("file", bodies.FILES)
 def test_a_third_party_mesh_falls_into_two_sound_pieces(file, stroke):
-    raw = read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])
+    raw = bodies.third_party_mesh(file)
     longest = np.ptp(raw.positions, axis=0).max()
     mesh = raw._replace(positions=raw.positions * (EXTENT / longest))
     tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.1))

@@ -4,6 +4,7 @@ The hand is a spring of 5 kN/m. The wall has no memory, so the exact force in ea
 the same is tested on tissue.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import mujoco
@@ -51,6 +52,7 @@ def tap(frame: int) -> float:
     return 0.5 * (GAP + DEPTH) * (1.0 - np.cos(2.0 * np.pi * 8.0 * frame * DT))
 
 
+@cache
 def press(
     hand: str,
     every: int,
@@ -121,7 +123,7 @@ HANDS = ("holds", "releases", "taps")
 
 
 @pytest.mark.parametrize("stiffness", [500.0, 5e3])
-@pytest.mark.parametrize("every", [1, 5, 10, 33])
+@pytest.mark.parametrize("every", [1, 10, 33])
 @pytest.mark.parametrize("hand", HANDS)
 def test_no_hand_gets_energy_out_of_a_wall(hand, every, stiffness):
     found = press(hand, every, stiffness)
@@ -130,7 +132,7 @@ def test_no_hand_gets_energy_out_of_a_wall(hand, every, stiffness):
 
 
 @pytest.mark.parametrize("stiffness", [500.0, 5e3, 25e3])
-@pytest.mark.parametrize("every", [1, 5, 10, 33])
+@pytest.mark.parametrize("every", [1, 10, 33])
 @pytest.mark.parametrize("hand", ["releases", "taps"])
 def test_by_the_motion_of_the_arm_no_hand_gets_energy_out_of_a_wall(hand, every, stiffness):
     """Forces that MuJoCo applied, and where it moved the blade: nothing that the observer knows."""
@@ -171,7 +173,7 @@ def test_holding_the_last_wrench_creates_energy(every):
     )
 
 
-@pytest.mark.parametrize("every", [1, 5, 10, 33])
+@pytest.mark.parametrize("every", [1, 10, 33])
 @pytest.mark.parametrize("hand", HANDS)
 def test_holding_the_last_wrench_creates_no_energy_with_the_controller(hand, every):
     assert press(hand, every, stiffness_scale=0.0).counters.passivity.least_energy >= NEVER_LESS
