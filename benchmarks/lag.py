@@ -13,8 +13,8 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from tests.browser import DETERMINISTIC, NAMES, WINDOW, first_installed
 from tests.scalpel_sim.hands.driven_view import DrivenView
+from tests.support.browser import DETERMINISTIC, NAMES, WINDOW, first_installed
 
 N_MOVES = 400
 SECONDS_PER_MOVE = 0.015

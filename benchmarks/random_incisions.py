@@ -18,9 +18,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from tests import bodies, incisions, judged
-from tests.incisions import Incision
-from tests.judged import Verdict
+from tests.support import bodies, incisions, judged
+from tests.support.incisions import Incision
+from tests.support.judged import Verdict
 from tissue import TetrahedralMesh
 
 KINDS = (*incisions.KINDS, "two that cross", "three planes")

@@ -27,7 +27,7 @@ from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.stroke import Stroke
-from tests import bodies
+from tests.support import bodies
 from tissue import (
     BladeSegment,
     BladeSweep,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
-from tests.overlaps import (
+from tests.support import bodies, strokes
+from tests.support.overlaps import (
     ELEMENT,
     NO_GRAVITY,
     SLAB,

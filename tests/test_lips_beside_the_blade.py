@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scalpel_sim.scene.scene import GEL
-from tests import bodies, strokes
-from tests.overlaps import ELEMENT, NO_GRAVITY, overlap_depths
-from tests.test_conservation import momentum
+from tests.support import bodies, strokes
+from tests.support.overlaps import ELEMENT, NO_GRAVITY, overlap_depths
+from tests.system.energy.test_conservation import momentum
 from tissue import BladeSweep, FloatArray, Material, SolverSettings, TetrahedralMesh, Tissue, block
 
 

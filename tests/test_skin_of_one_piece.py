@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.scene.scene import GEL
-from tests import strokes
+from tests.support import strokes
 from tissue import SolverSettings, TetrahedralMesh, Tissue, block
 
 CELL = 0.004

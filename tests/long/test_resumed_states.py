@@ -4,8 +4,8 @@ import numpy as np
 
 from scalpel_sim import SCENES, SimulationState, prepare
 from scalpel_sim.scene.scene import changed
-from tests.battery import battery
-from tests.run_files import assert_same_rows
+from tests.support.battery import battery
+from tests.support.run_files import assert_same_rows
 
 LAST_FRAMES = {"grid2": 600, "slab": 700, "retract": 1000}
 """Frames until which cases are drawn: into the cut, and until a grasper holds and lifts."""

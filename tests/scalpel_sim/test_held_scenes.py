@@ -13,8 +13,8 @@ from scalpel_sim.recording.recording import COLUMNS, held_columns, read_forces
 from scalpel_sim.scene.checks import check_attachment
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import AttachmentTable
-from tests.run_files import assert_same_rows, assert_same_run
 from tests.scalpel_sim.served_scenes import served
+from tests.support.run_files import assert_same_rows, assert_same_run
 
 FILE = """\
 seconds = 0.6

@@ -14,7 +14,7 @@ from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings, values_in
 from scalpel_sim.viewer.scene_packets import ScenePackets
-from tests.run_files import untimed
+from tests.support.run_files import untimed
 from tissue import StateError, SurfaceQuantity
 
 N_AFTER = 60

@@ -15,8 +15,8 @@ from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.served import scene_of
 from scalpel_sim.viewer import replay
-from tests.run_files import assert_same_run
 from tests.scalpel_sim.served_scenes import address_of_server, served
+from tests.support.run_files import assert_same_run
 
 FILE = """\
 seconds = 0.35

@@ -19,7 +19,7 @@ from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import DEFAULT_SCENE, scene_called
 from scalpel_sim.scene.scene import GEL, changed
 from scalpel_sim.scene.served import scene_of
-from tests.run_files import assert_same_rows, names_in
+from tests.support.run_files import assert_same_rows, names_in
 from tissue import Tissue, block, write_vtu
 
 GRID2 = SCENES["grid2"]

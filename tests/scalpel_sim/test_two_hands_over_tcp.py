@@ -10,8 +10,8 @@ from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import WaypointTable
 from tests.bridge.bits import bits
-from tests.run_files import assert_same_rows
 from tests.scalpel_sim.served_scenes import served
+from tests.support.run_files import assert_same_rows
 
 COARSE = scene_in(
     with_settings(shipped_scene("excise"), ("solver.audit=true", "body.cells=[18, 12, 2]"))

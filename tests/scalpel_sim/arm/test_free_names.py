@@ -11,9 +11,9 @@ from scalpel_sim.arm.free_names import free_name, free_prefix, names_in
 from scalpel_sim.arm.grasper import PADS_HEEL, PADS_TIP, GuidedGrasper, add_grasper
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.scene.scene import changed
-from tests.run_files import assert_same_rows
 from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
 from tests.scalpel_sim.served_scenes import served
+from tests.support.run_files import assert_same_rows
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1e-3]])
 SHEET = FixtureMesh("sheet", np.array([0.0, 0.3, 0.0]) + CORNERS, np.array([[0, 1, 2]]))

@@ -14,8 +14,8 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH
-from tests.processes import start, wait_for_rows
-from tests.run_files import assert_same_run, names_in
+from tests.support.processes import start, wait_for_rows
+from tests.support.run_files import assert_same_run, names_in
 from tissue import MATERIALS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"

@@ -9,8 +9,8 @@ from tornado.websocket import websocket_connect
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.runs.file_names import SCENE
-from tests.processes import PROGRAM, environment
-from tests.run_files import assert_same_run
+from tests.support.processes import PROGRAM, environment
+from tests.support.run_files import assert_same_run
 
 
 class ProcessOfARun:

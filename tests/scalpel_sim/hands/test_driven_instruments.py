@@ -18,8 +18,8 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE, perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
-from tests.run_files import assert_same_run, untimed
 from tests.scalpel_sim.hands.driven_runs import PERIOD, Clock, controls_of, led, move, turn
+from tests.support.run_files import assert_same_run, untimed
 
 SHEET = read_scene(Path(__file__).parent / "sheet.toml")
 

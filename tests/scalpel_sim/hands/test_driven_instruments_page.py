@@ -8,7 +8,6 @@ import pytest
 
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import FORCES
-from tests.browser import TIMEOUT, WINDOW
 from tests.scalpel_sim.hands.driven_view import DrivenView, assert_a_run_repeats
 from tests.scalpel_sim.hands.test_driven_page import (
     LAID_BARE,
@@ -18,6 +17,7 @@ from tests.scalpel_sim.hands.test_driven_page import (
     until_it_rests,
     until_the_tip_rests,
 )
+from tests.support.browser import TIMEOUT, WINDOW
 
 pytestmark = pytest.mark.end_to_end
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from scalpel_sim.runs.file_names import STROKE, SUMMARY
-from tests.browser import new_tab
 from tests.scalpel_sim.hands.driven_view import DrivenView, assert_a_run_repeats
+from tests.support.browser import new_tab
 
 pytestmark = pytest.mark.end_to_end
 

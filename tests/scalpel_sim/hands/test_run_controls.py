@@ -8,8 +8,8 @@ from scalpel_sim.hands.commands import End, Engage, Pause, Release, Reset, Resum
 from scalpel_sim.hands.run_controls import FRAMES_PER_STEP
 from scalpel_sim.runs.file_names import REPLAY, STROKE, SUMMARY
 from scalpel_sim.scene.scene import changed
-from tests.run_files import assert_same_run
 from tests.scalpel_sim.hands.driven_runs import GRID2, controls_of, done, led, move
+from tests.support.run_files import assert_same_run
 
 SCENE = changed(GRID2, relaxation="verlet")
 

@@ -19,7 +19,6 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
-from tests.run_files import assert_same_rows, assert_same_run
 from tests.scalpel_sim.hands.driven_runs import (
     DT,
     GRID2,
@@ -33,6 +32,7 @@ from tests.scalpel_sim.hands.driven_runs import (
     through_the_body,
     turn,
 )
+from tests.support.run_files import assert_same_rows, assert_same_run
 
 ROBOT = read_scene(Path(__file__).parents[3] / "docs" / "examples" / "robot.toml")
 """A scene with an arm of its own."""

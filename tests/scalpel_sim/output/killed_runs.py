@@ -14,8 +14,8 @@ from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import read_scene
-from tests.run_files import untimed
 from tests.scalpel_sim.hands.driven_runs import controls_of, through_the_body
+from tests.support.run_files import untimed
 
 EVERY = 0.1
 """Simulated time between two checkpoints [s]."""

@@ -25,7 +25,7 @@ from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_jso
 from scalpel_sim.recording.recording import COLUMNS, TERMS, Recording, columns_of_hand, read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, FORCES, PLOT, SUMMARY
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
-from tests.run_files import names_in
+from tests.support.run_files import names_in
 from tissue import CutReport, Energies, MeshMeasures, Snapshot, pieces_of
 
 DT = 1e-3

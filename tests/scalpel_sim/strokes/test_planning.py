@@ -7,8 +7,8 @@ from scalpel_sim.scene.strokes import PLANNED_STROKES
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.planning import check_meets, plan_stroke
 from scalpel_sim.strokes.stroke import Stroke
-from tests import bodies
-from tests.soundness import n_pieces
+from tests.support import bodies
+from tests.support.soundness import n_pieces
 from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe
 
 THROUGH = ("straight", "slanted", "curved")

@@ -11,9 +11,9 @@ from PIL import Image
 
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
-from tests.browser import UNTIL_DRAWN, WINDOW, local_file, new_tab, pixels_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
+from tests.support.browser import UNTIL_DRAWN, WINDOW, local_file, new_tab, pixels_of
 
 pytestmark = pytest.mark.browser
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.materials import SPRINGS
+from tests.support.materials import SPRINGS
 from tissue import SolverSettings, Tissue, block
 from tissue.core.jit import kernel
 from tissue.core.simd import (

@@ -7,7 +7,7 @@ plane, which is a plane of the mesh.
 import numpy as np
 import pytest
 
-from tests import soundness
+from tests.support import soundness
 from tissue import Tissue, block
 from tissue.blade.prescribed_cut import cut_along
 from tissue.cutting.finishing import MOST_PASSED, finish_sheet

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive, soundness
+from tests.support import bodies, naive, soundness
 from tests.tissue.cutting.upright_edge import put_edge
 from tests.tissue.kernels_of import cut_of
 from tissue import block

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests import bodies, naive, soundness
+from tests.support import bodies, naive, soundness
 from tests.tissue.kernels_of import DENSITY, cut_of, springs_of
 from tissue import block
 from tissue.core.vec3 import Vec3

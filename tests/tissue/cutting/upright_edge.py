@@ -1,6 +1,6 @@
 """An upright edge, longer than the body, that faces along y."""
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue.cutting.blade_path import put_on_lattice
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from tests.soundness import volumes
+from tests.support.soundness import volumes
 from tests.tissue.kernels_of import dense_modes, springs_of
 from tissue import FloatArray, Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.collapse import (

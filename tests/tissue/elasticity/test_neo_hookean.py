@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive_solid
+from tests.support import bodies, naive_solid
 from tests.tissue.cutting.test_stellar_subdivision import split_all
 from tests.tissue.kernels_of import cut_of
 from tests.tissue.solids import (

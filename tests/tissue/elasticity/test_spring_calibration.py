@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.materials import SPRINGS
+from tests.support import bodies
+from tests.support.materials import SPRINGS
 from tissue import Material, block
 from tissue.elasticity.spring_calibration import calibrated, on_surface, spring_error
 

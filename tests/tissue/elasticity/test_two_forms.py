@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive, naive_runge_kutta
+from tests.support import bodies, naive, naive_runge_kutta
 from tests.tissue.kernels_of import YOUNG_MODULUS, Network, network_of, oscillator
 
 pytestmark = pytest.mark.kernel

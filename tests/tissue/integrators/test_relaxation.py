@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests import bodies, strokes
-from tests.test_determinism import fingerprint
+from tests.support import bodies, strokes
+from tests.system.state.test_determinism import fingerprint
 from tissue import BladeShape, Material, SolverSettings, Tissue
 from tissue.integrators.hierarchical.stepper import relax_in_stages
 from tissue.mesh.tetrahedron_grid import no_grid

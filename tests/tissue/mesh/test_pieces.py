@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, soundness, strokes
+from tests.support import bodies, soundness, strokes
 from tissue import Material, Tissue, block
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive
+from tests.support import bodies, naive
 from tissue import block
 from tissue.mesh.body import build_body
 from tissue.mesh.star import LARGEST_STAR, edge_star, mean_node_size, no_visits, node_size, star

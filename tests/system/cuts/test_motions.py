@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from tests import bodies, soundness, strokes
-from tests.strokes import Stroke, Y, Z, pose
+from tests.support import bodies, soundness, strokes
+from tests.support.strokes import Stroke, Y, Z, pose
 from tissue import BladeSegment, FloatArray, TetrahedralMesh, Tissue, block
 
 EDGE = 0.05

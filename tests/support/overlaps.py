@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests import strokes
+from tests.support import strokes
 from tissue import FloatArray, IntArray, Snapshot, TetrahedralMesh, Tissue
 from tissue.mesh.faces import OUTWARD
 from tissue.mesh.pieces import piece_of_tetrahedra

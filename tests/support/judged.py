@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests import incisions, soundness, strokes
-from tests.incisions import Incision
+from tests.support import incisions, soundness, strokes
+from tests.support.incisions import Incision
 from tissue import FloatArray, Snapshot, TetrahedralMesh, Tissue
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests import naive_solid
+from tests.support import naive_solid
 from tissue import FloatArray, TetrahedralMesh
 from tissue.elasticity.energy_density import EnergyDensity
 

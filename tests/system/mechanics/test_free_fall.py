@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import strokes
-from tests.materials import SPRINGS
+from tests.support import strokes
+from tests.support.materials import SPRINGS
 from tissue import Material, SolverSettings, Tissue, block
 
 G = 9.81

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tissue import (
     BladeShape,
     BladeSweep,

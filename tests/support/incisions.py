@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.strokes import Stroke, pose
+from tests.support.strokes import Stroke, pose
 from tissue import FloatArray, TetrahedralMesh
 
 N_POSITIONS = 60

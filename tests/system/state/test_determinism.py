@@ -5,8 +5,8 @@ import hashlib
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
-from tests.materials import SPRINGS
+from tests.support import bodies, strokes
+from tests.support.materials import SPRINGS
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block
 
 MESHES = {

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests import soundness
-from tests.exact_pieces import divided
-from tests.piece_bounds import (
+from tests.support import soundness
+from tests.support.exact_pieces import divided
+from tests.support.piece_bounds import (
     centroids_of,
     contradictions,
     decided,
@@ -13,7 +13,7 @@ from tests.piece_bounds import (
     trimmed,
     within,
 )
-from tests.test_exact_pieces import SIDE, across
+from tests.support.test_exact_pieces import SIDE, across
 from tissue import Tissue, block
 
 MESH = block((4, 4, 4), (SIDE, SIDE, SIDE))

@@ -13,8 +13,8 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import cg
 
 from benchmarks.mesh_study import MODES, Bar, Model
-from tests import bodies
-from tests.materials import SPRINGS
+from tests.support import bodies
+from tests.support.materials import SPRINGS
 from tissue import SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.stiffness_matrix import stiffness_matrix
 from tissue.mesh.faces import sorted_faces

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies, incisions, strokes
-from tests.materials import SPRINGS
+from tests.support import bodies, incisions, strokes
+from tests.support.materials import SPRINGS
 from tests.tissue.kernels_of import row, springs_of
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.elasticity.internal_forces import elastic_energy

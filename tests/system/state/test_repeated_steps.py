@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tests import bodies, faults, strokes
+from tests.support import bodies, faults, strokes
 from tissue import (
     BladeShape,
     Geom,

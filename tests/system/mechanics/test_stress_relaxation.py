@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tests.tissue.solids import evaluate
 from tissue import MATERIALS, Material, SolverSettings, TetrahedralMesh, Tissue, block, liver_lobe
 from tissue.tissue import NOWHERE

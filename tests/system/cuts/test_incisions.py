@@ -11,8 +11,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests import bodies, incisions, judged, soundness
-from tests.incisions import Incision
+from tests.support import bodies, incisions, judged, soundness
+from tests.support.incisions import Incision
 from tissue import CutSettings, SolverSettings, TetrahedralMesh, Tissue
 
 EXACT = CutSettings(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tests.soundness import faces_of, triangle_areas, volumes
+from tests.support.soundness import faces_of, triangle_areas, volumes
 from tissue import FloatArray, IntArray, TetrahedralMesh
 
 SEAM = 1e-12

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.exact_pieces import ExactPieces, divided
+from tests.support.exact_pieces import ExactPieces, divided
 from tissue import block
 
 SIDE = 0.04

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import strokes
+from tests.support import strokes
 from tissue import MATERIALS, BladeShape, SolverSettings, Tissue, block, fixed_nodes
 
 GELATIN = replace(MATERIALS["gelatin"].material, blade_friction=0.0)

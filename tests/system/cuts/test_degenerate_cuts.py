@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies, incisions, soundness, strokes
-from tests.incisions import Incision
+from tests.support import bodies, incisions, soundness, strokes
+from tests.support.incisions import Incision
 from tissue import TetrahedralMesh, Tissue, block
 
 EDGE = 0.04

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import environment
+from tests.support.processes import environment
 
 NAMESPACE = ("unshare", "--map-root-user", "--mount", "sh", "-c")
 

@@ -6,7 +6,7 @@ import pytest
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
 from scalpel_sim.strokes.planning import plan_stroke
-from tests import bodies, soundness, strokes
+from tests.support import bodies, soundness, strokes
 from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe
 
 CUBE = (0.04, 0.04, 0.04)

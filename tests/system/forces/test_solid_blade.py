@@ -7,7 +7,7 @@ import pytest
 
 from scalpel_sim.validate import spine
 from scalpel_sim.validate.findings import FAIL, PASS
-from tests import strokes
+from tests.support import strokes
 from tissue import BladeShape, BladeSweep, Material, SolverSettings, Tissue, block
 
 SIZE = (0.06, 0.06, 0.03)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.bench.random_strokes import STROKE_DT, random_stroke
-from tests.bodies import sides
+from tests.support.bodies import sides
 from tissue import (
     BladeSegment,
     BladeShape,

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 BATTERY = """
 import pytest
-from tests.battery import Disagreement, battery
+from tests.support.battery import Disagreement, battery
 
 @battery(n_per_change=10, n_long=1000)
 def test_squares_end_in_other_digits_than_7(case):
@@ -39,7 +39,7 @@ def run(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: a battery\n")
 
     def run_with(*options, status=False):
-        command = [sys.executable, "-m", "pytest", "-p", "tests.battery", *options]
+        command = [sys.executable, "-m", "pytest", "-p", "tests.support.battery", *options]
         done = subprocess.run(
             command, cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
         )

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
-from tests.materials import SPRINGS
-from tests.test_conservation import NO_GRAVITY, SLAB, momentum
+from tests.support import bodies, strokes
+from tests.support.materials import SPRINGS
+from tests.system.energy.test_conservation import NO_GRAVITY, SLAB, momentum
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block
 
 HIERARCHICAL = Hierarchical(updates=16, rings=3)

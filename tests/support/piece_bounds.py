@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from tests.exact_pieces import Parts, crossed_faces
+from tests.support.exact_pieces import Parts, crossed_faces
 from tissue import BoolArray, FloatArray, IntArray, Snapshot
 
 RETRACTION = 2.0

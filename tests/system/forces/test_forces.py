@@ -8,8 +8,8 @@ import itertools
 import numpy as np
 import pytest
 
-from tests.bodies import sides
-from tests.materials import SPRINGS
+from tests.support.bodies import sides
+from tests.support.materials import SPRINGS
 from tissue import (
     MATERIALS,
     BladeSegment,
