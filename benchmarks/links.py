@@ -263,7 +263,7 @@ def _lags_in(url: str) -> tuple[FloatArray, str]:
     """Return the lags [s], and the speed of the run as the page shows it."""
     from playwright.sync_api import sync_playwright
 
-    from tests.browser import DETERMINISTIC, NAMES, WINDOW, first_installed
+    from tests.support.browser import DETERMINISTIC, NAMES, WINDOW, first_installed
 
     with sync_playwright() as driver:
         chromium = driver.chromium.launch(

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.battery import (
+from tests.support.battery import (
     pytest_addoption,
     pytest_collection_modifyitems,
     pytest_configure,
@@ -16,8 +16,8 @@ from tests.battery import (
     pytest_terminal_summary,
     tally,
 )
-from tests.browser import browser, tab
-from tests.small_disk import small_disks
+from tests.support.browser import browser, tab
+from tests.support.small_disk import small_disks
 
 # A shell that starts the tests in the background has Ctrl-C ignored, by their children too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -3,8 +3,8 @@
 A square bar, 8 times as long as thick, of n cells
 through its thickness (Kuhn's six tetrahedra each, or the twelve of a lattice), is clamped at one
 end and sags under its own weight. All strains are small, and everything follows from the stiffness
-matrix of `tissue.elasticity.stiffness_matrix`, which `tests/test_mechanics.py` compares with the
-forces that the engine computes.
+matrix of `tissue.elasticity.stiffness_matrix`, which `tests/system/mechanics/test_mechanics.py`
+compares with the forces that the engine computes.
 """
 
 import math

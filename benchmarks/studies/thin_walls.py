@@ -130,7 +130,7 @@ def thin_walls(
 
 def variation(number: int, seed: int) -> Variation:
     """Return variation `number` of a seed: three of five are shells, one a sheet, one a bar."""
-    from tests.bodies import half_shell
+    from tests.support.bodies import half_shell
 
     random = np.random.default_rng((seed, number))
     wall, share = random.uniform(*_WALLS), random.uniform(0.5, 1.0)

@@ -93,7 +93,7 @@ class LocalModel:
     of the blade since. A wrench that is merely held is half a period older than the blade, which
     generates energy with each push and release: a blade that a hand presses against a stiff wall
     begins to oscillate. With the stiffness it stays at rest, as with an answer in each frame
-    (`tests/test_passive_coupling.py`).
+    (`tests/system/forces/test_passive_coupling.py`).
 
     `K` is the stiffness of the contacts, as if the tissue behind them were fixed. Soft tissue
     yields, and resists a slow hand with a fraction of it. So a blade that presses on meets only the

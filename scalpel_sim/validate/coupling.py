@@ -191,8 +191,8 @@ COUPLING_SCENE = ValidationScene(
         "at the blade is added up from what was applied to the arm and where MuJoCo moved it: what "
         "comes back is less than what was put in, else a hand would feel buzzing. The bridge's own "
         "observer is a regression: its controller keeps it above zero. "
-        "`tests/test_passive_coupling.py` has walls of up to 25 kN/m, and what happens without any "
-        "of this."
+        "`tests/system/forces/test_passive_coupling.py` has walls of up to 25 kN/m, and what "
+        "happens without any of this."
     ),
     measure=_measure,
     references=[

@@ -18,7 +18,7 @@ from benchmarks.scaling import (
     measure_steps,
 )
 from scalpel_sim.validate.speed.command import IN_CLONE
-from tests.measured import is_sane, printed
+from tests.support.measured import is_sane, printed
 
 
 def test_a_cut_does_the_same_work_in_a_body_of_any_size():

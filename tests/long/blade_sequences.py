@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from tests import bodies, incisions, soundness
 from tests.long.cut_sequences import BODIES, Cut, Draw, body, drawn, kinds_of
-from tests.strokes import DT, Stroke, pose, sweeps
+from tests.support import bodies, incisions, soundness
+from tests.support.strokes import DT, Stroke, pose, sweeps
 from tissue import BladeSegment, BladeShape, Tissue
 
 SMALL = [name for name in BODIES if len(body(name).tetrahedra) < 700]

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim import SCENES
-from tests import bodies, incisions
-from tests.incisions import Incision, Shape
+from tests.support import bodies, incisions
+from tests.support.incisions import Incision, Shape
 from tissue import FloatArray, TetrahedralMesh, block, cylinder, liver_lobe
 from tissue.shapes.isosurface_stuffing import stuff
 

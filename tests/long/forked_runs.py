@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Self
 from unittest.mock import patch
 
-from tests.processes import environment
+from tests.support.processes import environment
 
 COUNT = struct.Struct("<q")
 

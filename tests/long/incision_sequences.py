@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tests import soundness
-from tests.exact_pieces import ExactPieces, Parts, divided
 from tests.long.cut_sequences import BODIES, Cut, Draw, body, drawn, kinds_of
-from tests.piece_bounds import centroids_of, contradictions, decided, pieces_at
+from tests.support import soundness
+from tests.support.exact_pieces import ExactPieces, Parts, divided
+from tests.support.piece_bounds import centroids_of, contradictions, decided, pieces_at
 from tissue import CutSettings, FloatArray, Snapshot, TetrahedralMesh, Tissue
 
 PATH_ERROR = 0.6

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from tests.battery import Disagreement, battery
 from tests.long.child import Child
+from tests.support.battery import Disagreement, battery
 
 LONGEST, PATIENCE = 120.0, 900.0
 """Longest processor time, and wall time, of a sequence [s]; most take some seconds."""

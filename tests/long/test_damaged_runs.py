@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.battery import battery
 from tests.scalpel_sim.output.damaged_runs import (
     copied,
     damaged_at_random,
@@ -15,6 +14,7 @@ from tests.scalpel_sim.output.damaged_runs import (
     run_in,
 )
 from tests.scalpel_sim.output.killed_runs import expect_same
+from tests.support.battery import battery
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import numpy as np
 
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.wire import Frame, FrameReader, MessageKind, pack_frame
-from tests.battery import battery
 from tests.bridge.tcp.bare_sockets import DT, HELLO
 from tests.long.frame_mutations import damaged_bytes
+from tests.support.battery import battery
 
 SENT = (Frame(MessageKind.HELLO, 0, b""), Frame(MessageKind.STEP, 1, pack_step(None, DT)))
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from scalpel_sim.runs.file_names import RUN_FILES
-from tests.battery import battery
-from tests.run_files import names_in
-from tests.small_disk import run_on_a_small_disk
-from tests.whole_runs import broken_files
+from tests.support.battery import battery
+from tests.support.run_files import names_in
+from tests.support.small_disk import run_on_a_small_disk
+from tests.support.whole_runs import broken_files
 
 ROOM = (31e6, 60e6)
 """Sizes of the disk [bytes]: with room for the reserve of `grid2`, or hardly."""

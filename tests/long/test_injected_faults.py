@@ -15,8 +15,8 @@ from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.arm.arm import ARMS, ArmError
 from scalpel_sim.arm.blade import BladeError
 from scalpel_sim.scene.scene import changed
-from tests import faults
-from tests.battery import battery
+from tests.support import faults
+from tests.support.battery import battery
 from tissue import TissueError, Wrench
 
 INSTANTS = (0.2, 0.5, 0.7, 1.0)

@@ -11,11 +11,11 @@ import pytest
 
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES
-from tests.battery import battery
 from tests.long.forked_runs import ForkedRuns, count_in
-from tests.processes import start
-from tests.run_files import names_in
-from tests.whole_runs import broken_files
+from tests.support.battery import battery
+from tests.support.processes import start
+from tests.support.run_files import names_in
+from tests.support.whole_runs import broken_files
 
 MOST_LOST = 100
 """Frames of a millisecond that a kill may cost."""

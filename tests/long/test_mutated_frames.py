@@ -2,9 +2,9 @@
 
 import pytest
 
-from tests.battery import battery
 from tests.long.child import GROWTH_WITH_KERNELS, HANG, Child
 from tests.long.frame_mutations import N_FRAMES
+from tests.support.battery import battery
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,9 @@
 
 import pytest
 
-from tests.battery import battery
 from tests.long.child import Child
 from tests.long.mesh_mutations import READ, REFUSED
+from tests.support.battery import battery
 
 
 @pytest.fixture(scope="module")

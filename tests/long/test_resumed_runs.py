@@ -12,9 +12,9 @@ import pytest
 
 from scalpel_sim.output.summary import COMPLETE
 from scalpel_sim.recording.recording import read_forces
-from tests.battery import battery
-from tests.processes import start
 from tests.scalpel_sim.output.killed_runs import figures, physics
+from tests.support.battery import battery
+from tests.support.processes import start
 
 RUN = ("run", "slab", "--seconds", "0.6", "--quiet", "--out")
 LONGEST_WAIT = 120.0

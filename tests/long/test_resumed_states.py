@@ -3,9 +3,9 @@
 import numpy as np
 
 from scalpel_sim import SCENES, SimulationState, prepare
-from scalpel_sim.recording.recording import WALL_TIMES
 from scalpel_sim.scene.scene import changed
-from tests.battery import battery
+from tests.support.battery import battery
+from tests.support.run_files import assert_same_rows
 
 LAST_FRAMES = {"grid2": 600, "slab": 700, "retract": 1000}
 """Frames until which cases are drawn: into the cut, and until a grasper holds and lifts."""
@@ -25,12 +25,6 @@ def scene_of(rng):
     return changed(SCENES[name], **changes), int(rng.integers(0, LAST_FRAMES[name]))
 
 
-def physics(simulation):
-    """Return the rows of all columns but wall times."""
-    columns = simulation.recording.columns
-    return simulation.recording.rows[:, [name not in WALL_TIMES for name in columns]]
-
-
 @battery(n_per_change=6, n_long=1_000)
 def test_a_simulation_made_alike_goes_on_from_bytes_at_any_frame(case):
     scene, n_frames = scene_of(np.random.default_rng(case))
@@ -42,7 +36,7 @@ def test_a_simulation_made_alike_goes_on_from_bytes_at_any_frame(case):
     other.load_state(SimulationState.from_bytes(data))
     for each in (simulation, other):
         each.run((n_frames + N_AFTER) * each.dt)
-    assert np.array_equal(physics(other), physics(simulation), equal_nan=True)
+    assert_same_rows(other.recording, simulation.recording)
     assert other.bridge.counters == simulation.bridge.counters
     ours, theirs = (each.link.snapshot() for each in (simulation, other))
     assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))

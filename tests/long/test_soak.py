@@ -3,9 +3,9 @@
 import math
 from contextlib import closing
 
-from tests.battery import battery
 from tests.long.child import Child
 from tests.long.soak import LIFE, Life
+from tests.support.battery import battery
 
 HOUR = 3600.0
 """Simulated time of a long run [s]."""

@@ -1,7 +1,7 @@
 """Whatever browsers do: the loop of a run never waits, and a good page sees it."""
 
-from tests.battery import battery
 from tests.long.viewer_faults import NO_WAIT, harass
+from tests.support.battery import battery
 
 
 @battery(n_per_change=1, n_long=100)

@@ -3,16 +3,10 @@
 import threading
 from contextlib import closing, contextmanager
 
-import numpy as np
-
 from bridge import TcpLink
 from bridge.tcp.server import TissueServer
 from scalpel_sim.preparation.tissue import make_tissue
-from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.scene.served import sent_views
-
-N_TIMES = 6
-"""Columns of wall times, the last of `COLUMNS`."""
 
 
 def address_of_server(scene):
@@ -28,9 +22,3 @@ def served(scene):
     """Yield a link to the tissue of a scene, which a thread of this process serves."""
     with closing(TcpLink(address_of_server(scene))) as link:
         yield link
-
-
-def untimed(recording):
-    """Return the rows of a recording without wall times."""
-    n = len(COLUMNS)
-    return np.delete(recording.rows, slice(n - N_TIMES, n), axis=1)

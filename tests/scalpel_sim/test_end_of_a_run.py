@@ -15,10 +15,10 @@ import pytest
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import RUN_FILES, STROKE
-from tests.processes import PROGRAM, environment, start, wait_for_rows, wait_until_heard
-from tests.run_files import names_in
-from tests.small_disk import run_on_a_small_disk
-from tests.whole_runs import broken_files
+from tests.support.processes import PROGRAM, environment, start, wait_for_rows, wait_until_heard
+from tests.support.run_files import names_in
+from tests.support.small_disk import run_on_a_small_disk
+from tests.support.whole_runs import broken_files
 
 pytestmark = pytest.mark.end_to_end
 

@@ -13,7 +13,8 @@ from scalpel_sim.recording.recording import COLUMNS, held_columns, read_forces
 from scalpel_sim.scene.checks import check_attachment
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import AttachmentTable
-from tests.scalpel_sim.served_scenes import served, untimed
+from tests.scalpel_sim.served_scenes import served
+from tests.support.run_files import assert_same_rows, assert_same_run
 
 FILE = """\
 seconds = 0.6
@@ -93,8 +94,7 @@ def test_the_summary_says_what_each_held_and_at_which_force(first):
 def test_the_scene_that_a_run_writes_gives_the_same_bits_again(first, tmp_path):
     words = ["run", str(first / "scene.toml"), "-q", "--out", str(tmp_path / "again")]
     assert command_line(words) == 0
-    runs = [read_forces(folder / "forces.csv") for folder in (first, tmp_path / "again")]
-    np.testing.assert_array_equal(untimed(runs[0]), untimed(runs[1]))
+    assert_same_run(first, tmp_path / "again")
     assert (tmp_path / "again" / "scene.toml").read_text() == (first / "scene.toml").read_text()
 
 
@@ -106,7 +106,7 @@ def test_over_tcp_the_paths_and_the_forces_are_the_same_bits(first):
         there = prepare(scene, link)
         there.run(0.15)
     assert there.recording.n_held == 2
-    np.testing.assert_array_equal(untimed(here.recording), untimed(there.recording))
+    assert_same_rows(here.recording, there.recording)
 
 
 def test_a_body_that_only_attachments_hold_hangs_from_them(first):

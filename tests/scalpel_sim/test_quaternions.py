@@ -9,7 +9,6 @@ import pytest
 
 from scalpel_sim import quaternions
 
-SEEDS = range(200)
 CONTRACTS = platform.machine() not in ("x86_64", "AMD64")
 """Whether MuJoCo is compiled with fused multiplications and additions, which round once."""
 
@@ -37,9 +36,15 @@ def numbers(array):
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", range(4))
 def test_each_function_gives_the_bits_of_mujoco(seed):
     rng = np.random.default_rng(seed)
+    for _ in range(50):
+        assert_as_mujoco(rng)
+
+
+def assert_as_mujoco(rng):
+    """Compare each function for random arguments: small turns, half turns and zero vectors too."""
     a, b = random_quaternion(rng), random_quaternion(rng)
     near = a + rng.choice([0.0, 1e-9, 1e-4]) * rng.normal(size=4)
     near /= np.linalg.norm(near)

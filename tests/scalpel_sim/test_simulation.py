@@ -12,26 +12,18 @@ from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.preparation.tissue import check_scene, make_tissue, pulled_apart
-from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES, SCENE
 from scalpel_sim.runs.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import DEFAULT_SCENE, scene_called
 from scalpel_sim.scene.scene import GEL, changed
 from scalpel_sim.scene.served import scene_of
-from tests.run_files import names_in
+from tests.support.run_files import assert_same_rows, names_in
 from tissue import Tissue, block, write_vtu
 
 GRID2 = SCENES["grid2"]
 UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT, SCENE}
-UNTIMED = COLUMNS.index("cd_s")
-"""Columns from here on are wall times."""
-
-
-def same_bits(first: Simulation, second: Simulation) -> bool:
-    """Return whether two recordings are the same but for wall times; NaN equals NaN."""
-    one, other = (simulation.recording.rows[:, :UNTIMED] for simulation in (first, second))
-    return np.array_equal(one, other, equal_nan=True)
 
 
 def test_two_runs_of_a_scene_give_the_same_bits():
@@ -39,7 +31,7 @@ def test_two_runs_of_a_scene_give_the_same_bits():
     for simulation in (first, second):
         simulation.run(0.8)
     assert first.result.cut_area > 0.0
-    assert same_bits(first, second)
+    assert_same_rows(first.recording, second.recording)
 
 
 def test_a_run_in_two_parts_is_the_run_in_one():
@@ -47,7 +39,7 @@ def test_a_run_in_two_parts_is_the_run_in_one():
     whole.run(0.5)
     parts.run(0.2)
     parts.run(0.5)
-    assert same_bits(whole, parts)
+    assert_same_rows(whole.recording, parts.recording)
 
 
 def test_a_run_ends_when_its_callback_returns_true():

@@ -10,7 +10,8 @@ from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import WaypointTable
 from tests.bridge.bits import bits
-from tests.scalpel_sim.served_scenes import served, untimed
+from tests.scalpel_sim.served_scenes import served
+from tests.support.run_files import assert_same_rows
 
 COARSE = scene_in(
     with_settings(shipped_scene("excise"), ("solver.audit=true", "body.cells=[18, 12, 2]"))
@@ -47,7 +48,7 @@ def test_a_grasper_closes_holds_and_lets_go_over_tcp_as_in_process_bit_for_bit(h
     with served(scene) as link:
         there = ran(scene, link)
         assert bits(here.link.snapshot()) == bits(link.snapshot())
-    np.testing.assert_array_equal(untimed(here.recording), untimed(there.recording))
+    assert_same_rows(here.recording, there.recording)
     recording = there.recording
     time, force = recording.column("time_s"), recording.vector("left_force")
     held = (time > 0.4) & (time < 0.5)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive_solid
-from tests.naive_solid import around_nodes
+from tests.support import bodies, naive_solid
+from tests.support.naive_solid import around_nodes
 from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, block, fixed_nodes
 from tissue.elasticity.stiffness_matrix import edge_springs
 from tissue.mesh.surface import boundary_nodes

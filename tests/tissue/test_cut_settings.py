@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tests import soundness
-from tests.strokes import curved, make, upright
+from tests.support import soundness
+from tests.support.strokes import curved, make, upright
 from tissue import CutReport, CutSettings, Material, SolverSettings, Tissue, block, fixed_nodes
 
 SIZE = 0.04

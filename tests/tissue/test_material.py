@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.materials import SPRINGS
+from tests.support.materials import SPRINGS
 from tissue import Material, Tissue, block
 
 

@@ -10,7 +10,7 @@ import weakref
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tissue import (
     BladeSegment,
     BladeShape,

@@ -57,7 +57,7 @@ class _Amounts(NamedTuple):
 class MeshChanges(NamedTuple):
     """What changes of the mesh added to each energy [J]. No time passes in them.
 
-    Tests bound each in sign and size (`tests/test_energy_account.py`).
+    Tests bound each in sign and size (`tests/system/energy/test_energy_account.py`).
     """
 
     elastic: float = 0.0

@@ -16,7 +16,7 @@ from bridge.device.messages import SERVO, ServoRequest
 from bridge.tcp.wire import MessageKind, pack_frame
 from tests.bridge.device.served_blade import ORIGIN, POSE, STATE, UNTURNED, served_blade
 from tests.bridge.tcp.bare_sockets import HELLO, connected, read_one
-from tests.processes import free_port, started_first
+from tests.support.processes import free_port, started_first
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "device.py"
 KEY = bytes(range(32))

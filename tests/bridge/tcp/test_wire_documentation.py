@@ -33,7 +33,7 @@ from bridge.tcp.request_limits import (
 from bridge.tcp.single_client import MAX_STRANGERS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.tcp.test_places import server_in_a_thread
-from tests.processes import free_port, started_first
+from tests.support.processes import free_port, started_first
 from tissue import BodyContacts, MeshMeasures, RigidContacts, StageTimes
 from tissue.contact.geoms.geom_contact import MOST_INCREMENTS
 

@@ -12,7 +12,8 @@ from scalpel_sim.arm.grasper import PADS_HEEL, PADS_TIP, GuidedGrasper, add_gras
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
-from tests.scalpel_sim.served_scenes import served, untimed
+from tests.scalpel_sim.served_scenes import served
+from tests.support.run_files import assert_same_rows
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1e-3]])
 SHEET = FixtureMesh("sheet", np.array([0.0, 0.3, 0.0]) + CORNERS, np.array([[0, 1, 2]]))
@@ -129,7 +130,7 @@ def test_every_kind_of_what_is_added_is_among_them(usual):
 def test_robots_with_all_of_our_names_do_the_same_to_the_bit(usual, tmp_path):
     expected, taken = usual
     found = ran(two_robots(tmp_path / "taken", taken))
-    np.testing.assert_array_equal(untimed(found.recording), untimed(expected.recording))
+    assert_same_rows(found.recording, expected.recording)
     np.testing.assert_array_equal(found.arm.data.qpos, expected.arm.data.qpos)
     assert np.abs(found.recording.vector("force")).max() > 1e-3
     kept = named_in(found.arm.model)
@@ -141,7 +142,7 @@ def test_over_tcp_too(usual, tmp_path):
     scene = two_robots(tmp_path / "taken", taken)
     with served(scene) as link:
         found = ran(scene, link)
-    np.testing.assert_array_equal(untimed(found.recording), untimed(expected.recording))
+    assert_same_rows(found.recording, expected.recording)
 
 
 OF_GRASPER = ("scalpel_sim_grasper_", "")

@@ -105,14 +105,6 @@ def test_the_hand_holds_any_pose_to_which_it_is_brought_slowly():
     assert np.allclose(segment.forward, goal.forward, atol=5e-3)
 
 
-def test_a_pose_that_is_not_finite_is_refused_and_leaves_the_hand_where_it_was():
-    arm = Arm("touch")
-    wanted = arm.data.mocap_pos.copy()
-    with pytest.raises(ValueError, match="not finite"):
-        arm.hand.follow(moved(arm.blade.segment(), [np.nan, 0.0, 0.0]))
-    assert np.array_equal(arm.data.mocap_pos, wanted)
-
-
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_an_impedance_is_positive(value):
     with pytest.raises(ValueError, match="rotational_stiffness is"):

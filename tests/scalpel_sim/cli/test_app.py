@@ -14,8 +14,8 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH
-from tests.processes import start, wait_for_rows
-from tests.run_files import names_in
+from tests.support.processes import start, wait_for_rows
+from tests.support.run_files import assert_same_run, names_in
 from tissue import MATERIALS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
@@ -53,10 +53,6 @@ WRONG_USE = {
         ["run", "slab", "--coupling-stiffness", "500"],
         "--coupling-stiffness is for --coupling virtual",
     ),
-    "a coupling of negative stiffness": (
-        ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
-        "--coupling-stiffness is -1.0; it must be a number above 0",
-    ),
     "a coupling without damping": (
         ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
         "damping is 0.0; it must be positive",
@@ -65,7 +61,6 @@ WRONG_USE = {
         ["run", "slab", "--tissue-every", "0"],
         "--tissue-every is 0; it must be a whole number from 1 to 100",
     ),
-    "a tissue that is queried too seldom": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
     "a negative modulus": (
         ["run", "slab", "--young", "-1"],
         "--young is -1.0; it must be a number above 0",
@@ -129,21 +124,9 @@ WRONG_USE = {
         "add --blade-edge-radius",
     ),
     "negative friction": (["run", "organ", "--blade-friction", "-0.1"], "--blade-friction is -0.1"),
-    "a skin of negative toughness": (
-        ["run", "slab", "--skin-toughness", "-1"],
-        "--skin-toughness is -1",
-    ),
-    "a toughness speed of 0": (
-        ["run", "slab", "--toughness-speed", "0"],
-        "--toughness-speed is 0",
-    ),
     "an audit of a hierarchical relaxation": (
         ["run", "slab", "--audit", "--relaxation", "hierarchical"],
         "--audit needs --relaxation global or verlet",
-    ),
-    "fewer threads than one": (
-        ["run", "slab", "--threads", "0"],
-        "--threads is 0; it must be a whole number",
     ),
     "the hierarchy on two threads": (
         ["run", "slab", "--relaxation", "hierarchical", "--threads", "2"],
@@ -162,7 +145,6 @@ WRONG_USE = {
         "--gravity belongs to the tissue",
     ),
     "a negative time": (["run", "slab", "--seconds", "-1"], "--seconds"),
-    "an infinite time": (["run", "slab", "--seconds", "inf"], "--seconds"),
     "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),
     "a figure by an unknown scheme": (
         ["figure", "10", "--scheme", "mine"],
@@ -256,15 +238,6 @@ def test_a_run_that_starts_before_its_server_waits_for_it_and_says_so(monkeypatc
     waits, failed = capsys.readouterr().err.splitlines()
     assert f"no tissue is served at {address} yet; waiting for it, up to 0.3 s" in waits
     assert failed.startswith(f"error: no tissue is served at {address}")
-
-
-def test_an_unreachable_server_is_a_failed_run(files, monkeypatch, capsys):
-    monkeypatch.setattr("scalpel_sim.cli.run_setup.SERVER_PATIENCE", 0.0)
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{unused.getsockname()[1]}"
-    assert command_line(["run", "--connect", address]) == 1
-    assert address in only_line(capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("command", ["serve", "view"])
@@ -483,12 +456,10 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
         server.send_signal(signal.SIGINT)
         server.communicate(timeout=60)
     assert server.returncode == 0
-    ours, theirs = (read_forces(folder / "forces.csv") for folder in (here, there))
-    timed = 6  # columns of wall times at the end
+    ours = read_forces(here / "forces.csv")
     assert ours.column("cut_area_m2").max() > 0.0
     assert ours.is_audited  # so that no number is a NaN
-    assert np.array_equal(ours.rows[:, :-timed], theirs.rows[:, :-timed])
-    assert (here / "final.vtu").read_bytes() == (there / "final.vtu").read_bytes()
+    assert_same_run(here, there)
     assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
     # The client does not know how the server's tissue is held: it writes no scene.
     assert (here / "scene.toml").exists() and not (there / "scene.toml").exists()

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.small_disk import run_on_a_full_disk
+from tests.support.small_disk import run_on_a_full_disk
 
 WORDS = {
     "key": ("key", "/mnt/new.key"),

@@ -1,40 +1,40 @@
 """A live run in another process, and what a page does to lead it."""
 
-import os
 import re
 import subprocess
-import sys
 import urllib.request
 
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.runs.file_names import SCENE
+from tests.support.processes import PROGRAM, environment
+from tests.support.run_files import assert_same_run
 
-class LiveView:
-    """A `scalpel-sim view` in another process."""
 
-    def __init__(self, scene, folder, *options):
+class ProcessOfARun:
+    """The program in another process; its log is read on."""
+
+    def __init__(self, folder, *words):
         self.folder = folder
-        command = [sys.executable, "-m", "scalpel_sim", "view", scene]
         self.process = subprocess.Popen(
-            [*command, *options, "--out", str(folder)],
+            [*PROGRAM, *words, "--out", str(folder)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            env=environment(),
         )
-        self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("http://")).group()
 
     def line_with(self, text):
         """Wait for a line of the log, and return it."""
+        lines = []
         for line in self.process.stderr:
+            lines.append(line)
             if text in line:
                 return line
-        raise AssertionError(f"it ended without saying '{text}'")
-
-    def wait_for_files(self):
-        self.line_with("stays until Ctrl-C")
+        raise AssertionError(f"it ended without saying '{text}', but {lines}")
 
     def __enter__(self):
         return self
@@ -44,11 +44,37 @@ class LiveView:
         self.process.communicate()
 
 
+class DeviceRunProcess(ProcessOfARun):
+    """A run that waits for a device."""
+
+    def __init__(self, command, folder, *options):
+        hand = ["--hand", "device", "--listen", "127.0.0.1:0"]
+        super().__init__(folder, command, "grid2", *hand, *options)
+        self.address = self.line_with("waiting for a device at").split()[-1]
+
+
+class LiveView(ProcessOfARun):
+    """A `scalpel-sim view`."""
+
+    def __init__(self, scene, folder, *options):
+        super().__init__(folder, "view", scene, *options)
+        self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("http://")).group()
+
+    def wait_for_files(self):
+        self.line_with("stays until Ctrl-C")
+
+
 class DrivenView(LiveView):
-    """A `scalpel-sim view --hand live` in another process."""
+    """A `scalpel-sim view --hand live`."""
 
     def __init__(self, scene, folder, *options):
         super().__init__(scene, folder, "--hand", "live", *options)
+
+
+def assert_a_run_repeats(led, folder):
+    """Do what was recorded once more, and compare the bits."""
+    assert command_line(["run", str(led / SCENE), "-q", "--out", str(folder)]) == 0
+    assert_same_run(led, folder)
 
 
 def document(url):

@@ -10,7 +10,6 @@ from bridge import CartesianPose
 from scalpel_sim.hands.commands import FARTHEST_MOVE, FARTHEST_TURN
 from scalpel_sim.hands.device_hand import WATCHDOG, DeviceHand
 from scalpel_sim.hands.limited_pose import FARTHEST_AHEAD, MOST_SPEED, MOST_TURN_RATE
-from scalpel_sim.instruments.scene_arms import ROOM
 from tests.scalpel_sim.hands.driven_runs import DT, ROUNDING, Clock, led, poses
 
 SETTLED = 1e-6
@@ -84,13 +83,6 @@ def test_no_motion_is_faster_than_the_limits_and_it_is_counted(hand):
     assert turns.max() <= MOST_TURN_RATE * (1.0 + 1e-6)
     assert speeds.max() == pytest.approx(MOST_SPEED)
     assert 200 < hand.n_limited <= 300
-
-
-def test_the_tip_stays_in_the_room_around_the_body(hand, at_start):
-    high = at_start[0].link.describe().bounds[1]
-    found = led_by(hand, 1500, lambda k: pose(*(3 * [k * 2e-4])))
-    assert (found[:, :3].max(axis=0) <= high + ROOM + ROUNDING).all()
-    assert found[-1, :3] == pytest.approx(high + ROOM, abs=SETTLED)
 
 
 @pytest.mark.parametrize(

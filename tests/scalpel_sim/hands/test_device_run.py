@@ -1,11 +1,8 @@
 """`scalpel-sim run --hand device`, led by a fake device from another process."""
 
 import json
-import os
 import re
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,54 +11,11 @@ from bridge import DeviceClient, LinkError, write_new_key
 from bridge.tcp.keys import read_key
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.recording import COLUMNS, read_forces
-from scalpel_sim.runs.file_names import FINAL, FORCES, SCENE, STROKE, SUMMARY
+from scalpel_sim.runs.file_names import FORCES, STROKE, SUMMARY
 from tests.scalpel_sim.hands.device_runs import lead_forwards
+from tests.scalpel_sim.hands.driven_view import DeviceRunProcess, assert_a_run_repeats
 
 pytestmark = pytest.mark.end_to_end
-
-UNTIMED = COLUMNS.index("cd_s")
-"""Columns from here on are wall times."""
-
-
-class DeviceRunProcess:
-    """A run that waits for a device, in another process."""
-
-    def __init__(self, command, folder, *options):
-        self.folder = folder
-        arguments = [command, "grid2", "--hand", "device", "--listen", "127.0.0.1:0", *options]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "scalpel_sim", *arguments, "--out", str(folder)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        )
-        self.address = self.line_with("waiting for a device at").split()[-1]
-
-    def line_with(self, text):
-        """Wait for a line of the log, and return it."""
-        lines = []
-        for line in self.process.stderr:
-            lines.append(line)
-            if text in line:
-                return line
-        raise AssertionError(f"it ended without saying '{text}', but {lines}")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.communicate()
-
-
-def assert_a_run_repeats(led, folder):
-    """Do what was recorded once more, and compare the bits."""
-    assert command_line(["run", str(led / SCENE), "-q", "--out", str(folder)]) == 0
-    assert (folder / FINAL).read_bytes() == (led / FINAL).read_bytes()
-    rows = [read_forces(each / FORCES).rows[:, :UNTIMED] for each in (led, folder)]
-    assert np.array_equal(*rows, equal_nan=True)
 
 
 def test_devices_lead_a_cut_in_turn_until_one_ends_it_and_a_run_repeats_it_to_the_bit(tmp_path):

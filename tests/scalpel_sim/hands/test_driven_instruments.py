@@ -13,20 +13,19 @@ from scalpel_sim.hands.driven_instruments import JAW_SPEED
 from scalpel_sim.hands.limited_pose import MOST_SPEED
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.runs.file_names import FINAL, SCENE, STROKE, grasp_file
 from scalpel_sim.runs.run import REST_AFTER_STROKE, perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
 from tests.scalpel_sim.hands.driven_runs import PERIOD, Clock, controls_of, led, move, turn
+from tests.support.run_files import assert_same_run, untimed
 
 SHEET = read_scene(Path(__file__).parent / "sheet.toml")
 
 BLADE, GRASPER = 0, 1
 """Numbers of the instruments."""
 
-UNTIMED = slice(0, COLUMNS.index("cd_s"))
 """Columns of `forces.csv` before wall times."""
 
 DT = 1e-3
@@ -115,11 +114,7 @@ def test_a_run_of_the_scene_that_it_wrote_repeats_it_to_the_bit(lifted, tmp_path
     repeated = prepare(read_scene(folder / SCENE))
     performed(repeated, tmp_path)
     assert len(repeated.recording) == len(simulation.recording)
-    n = simulation.recording.columns.index("cd_s"), len(COLUMNS)
-    for rows in (np.s_[:, : n[0]], np.s_[:, n[1] :]):
-        led_rows, again = (each.recording.rows[rows] for each in (simulation, repeated))
-        assert np.array_equal(led_rows, again, equal_nan=True)
-    assert (folder / FINAL).read_bytes() == (tmp_path / FINAL).read_bytes()
+    assert_same_run(folder, tmp_path)
 
 
 def test_a_scripted_run_leaves_what_a_hand_did(lifted, tmp_path):
@@ -220,8 +215,8 @@ def test_a_state_saved_while_a_grasper_holds_brings_both_hands_back_to_the_bit()
             simulation.step()
 
     def where():
-        rows = simulation.recording.rows[700:, UNTIMED]
-        return rows.copy(), hand.chosen, [each.pose.wanted.copy() for each in hand.instruments]
+        rows = untimed(simulation.recording)[700:]
+        return rows, hand.chosen, [each.pose.wanted.copy() for each in hand.instruments]
 
     go_on(700)
     state = simulation.save_state()

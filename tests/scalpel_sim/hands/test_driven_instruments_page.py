@@ -8,17 +8,16 @@ import pytest
 
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import FORCES
-from tests.browser import TIMEOUT, WINDOW
-from tests.scalpel_sim.hands.driven_view import DrivenView
+from tests.scalpel_sim.hands.driven_view import DrivenView, assert_a_run_repeats
 from tests.scalpel_sim.hands.test_driven_page import (
     LAID_BARE,
-    assert_a_run_repeats,
     end,
     opened,
     tip,
     until_it_rests,
     until_the_tip_rests,
 )
+from tests.support.browser import TIMEOUT, WINDOW
 
 pytestmark = pytest.mark.end_to_end
 
@@ -161,7 +160,7 @@ def test_a_gamepad_holds_with_the_grasper_and_cuts_with_the_blade_and_the_record
     assert last["left_points"] > 0
     assert last["left_force_z_n"] < 0.0, "the sheet hangs from the jaws"
     assert last["cut_area_m2"] > 1e-4
-    assert_a_run_repeats(view, tmp_path / "again")
+    assert_a_run_repeats(view.folder, tmp_path / "again")
 
 
 @pytest.mark.browser

@@ -6,16 +6,11 @@ import time
 import numpy as np
 import pytest
 
-from scalpel_sim.cli.app import command_line
-from scalpel_sim.recording.recording import COLUMNS, read_forces
-from scalpel_sim.runs.file_names import FINAL, FORCES, SCENE, STROKE, SUMMARY
-from tests.browser import new_tab
-from tests.scalpel_sim.hands.driven_view import DrivenView
+from scalpel_sim.runs.file_names import STROKE, SUMMARY
+from tests.scalpel_sim.hands.driven_view import DrivenView, assert_a_run_repeats
+from tests.support.browser import new_tab
 
 pytestmark = pytest.mark.end_to_end
-
-UNTIMED = COLUMNS.index("cd_s")
-"""Columns from here on are wall times."""
 
 STEPS_OF_DRAG = 15
 """Moves of the mouse in a drag."""
@@ -122,14 +117,6 @@ def end(tab, view):
     assert tab.failures == []
 
 
-def assert_a_run_repeats(view, folder):
-    """Do what was recorded once more, and compare the bits."""
-    assert command_line(["run", str(view.folder / SCENE), "-q", "--out", str(folder)]) == 0
-    assert (folder / FINAL).read_bytes() == (view.folder / FINAL).read_bytes()
-    led, again = (read_forces(each / FORCES).rows[:, :UNTIMED] for each in (view.folder, folder))
-    assert np.array_equal(led, again, equal_nan=True)
-
-
 def pieces(view):
     return json.loads((view.folder / SUMMARY).read_text())["pieces"]
 
@@ -148,7 +135,7 @@ def test_a_mouse_cuts_the_organ_in_two_and_a_run_of_the_record_has_the_same_bits
     assert "from hand to picture" in tab.inner_text("#lag")
     end(tab, view)
     assert pieces(view) == 2
-    assert_a_run_repeats(view, tmp_path / "again")
+    assert_a_run_repeats(view.folder, tmp_path / "again")
     assert (view.folder / STROKE).exists()
 
 

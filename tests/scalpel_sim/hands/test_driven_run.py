@@ -57,14 +57,6 @@ def test_a_stroke_that_was_led_for_some_seconds_is_repeated_by_name_to_the_bit(t
     assert np.array_equal(*rows)
 
 
-def test_a_scripted_run_keeps_the_stroke_that_it_repeats(tmp_path):
-    with DrivenView("grid2", tmp_path, "--seconds", "0.2") as view:
-        asyncio.run(lead(view))
-    stroke = (tmp_path / STROKE).read_bytes()
-    assert command_line(["run", str(tmp_path / "scene.toml"), "-q", "--out", str(tmp_path)]) == 0
-    assert (tmp_path / STROKE).read_bytes() == stroke
-
-
 def test_a_led_run_that_was_killed_goes_on_as_a_run_of_what_the_hand_had_done(tmp_path):
     led, again = tmp_path / "led", tmp_path / "again"
     with DrivenView("grid2", led, "--checkpoint", "0.1") as view:

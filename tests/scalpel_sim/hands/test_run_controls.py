@@ -6,13 +6,10 @@ import pytest
 from scalpel_sim import prepare
 from scalpel_sim.hands.commands import End, Engage, Pause, Release, Reset, Resume, Step, Undo
 from scalpel_sim.hands.run_controls import FRAMES_PER_STEP
-from scalpel_sim.recording.recording import COLUMNS, read_forces
-from scalpel_sim.runs.file_names import FINAL, FORCES, REPLAY, STROKE, SUMMARY
+from scalpel_sim.runs.file_names import REPLAY, STROKE, SUMMARY
 from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.hands.driven_runs import GRID2, controls_of, done, led, move
-
-UNTIMED = COLUMNS.index("cd_s")
-"""Columns from here on are wall times."""
+from tests.support.run_files import assert_same_run
 
 SCENE = changed(GRID2, relaxation="verlet")
 
@@ -122,9 +119,7 @@ def test_what_was_undone_is_in_no_file_and_a_run_of_the_record_has_the_same_bits
     done(simulation, driven_folder, seconds=10.0, every_frame=every_frame, controls=controls)
     repeated = prepare(changed(SCENE, stroke=str(driven_folder / STROKE)))
     done(repeated, again)
-    assert (driven_folder / FINAL).read_bytes() == (again / FINAL).read_bytes()
-    rows = [read_forces(folder / FORCES).rows[:, :UNTIMED] for folder in (driven_folder, again)]
-    assert np.array_equal(*rows, equal_nan=True)
+    assert_same_run(driven_folder, again)
     times = np.loadtxt(driven_folder / STROKE, delimiter=",", skiprows=1)[:, 0]
     assert (np.diff(times) > 0.0).all() and not script
     assert (driven_folder / REPLAY).read_text().count('class="packet"') > 10

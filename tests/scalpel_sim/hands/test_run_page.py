@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.browser import new_tab
 from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView
 from tests.scalpel_sim.hands.test_driven_page import drag, tip, until_it_rests
+from tests.support.browser import new_tab
 
 pytestmark = pytest.mark.end_to_end
 

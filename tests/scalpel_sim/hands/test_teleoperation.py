@@ -14,8 +14,7 @@ from scalpel_sim.hands.limited_pose import (
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.instruments.scene_arms import ROOM
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.recording.recording import COLUMNS
-from scalpel_sim.runs.file_names import FINAL, STROKE
+from scalpel_sim.runs.file_names import STROKE
 from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.scene import changed
@@ -33,12 +32,10 @@ from tests.scalpel_sim.hands.driven_runs import (
     through_the_body,
     turn,
 )
+from tests.support.run_files import assert_same_rows, assert_same_run
 
 ROBOT = read_scene(Path(__file__).parents[3] / "docs" / "examples" / "robot.toml")
 """A scene with an arm of its own."""
-
-UNTIMED = COLUMNS.index("cd_s")
-"""Columns from here on are wall times."""
 
 LEAST_ROOM = 0.01
 """Room in each direction in which a hand can do something in a body of some 30 mm [m]."""
@@ -171,9 +168,7 @@ def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
 
     repeated = prepare(changed(scene, stroke=str(tmp_path / "led" / STROKE)))
     done(repeated, tmp_path / "again")
-    same_rows = [each.recording.rows[:, :UNTIMED] for each in (simulation, repeated)]
-    assert np.array_equal(*same_rows, equal_nan=True)
-    assert (tmp_path / "led" / FINAL).read_bytes() == (tmp_path / "again" / FINAL).read_bytes()
+    assert_same_run(tmp_path / "led", tmp_path / "again")
 
 
 @pytest.mark.parametrize("scene", [SCENES["incision"], ROBOT], ids=lambda scene: scene.name)
@@ -190,9 +185,8 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
     recorded = StrokeTable(kind="recorded", file=str(tmp_path / STROKE))
     repeated = prepare(changed(scene, strokes=(recorded,)))
     repeated.run(0.05)
-    same_rows = [each.recording.rows[:, :UNTIMED] for each in (simulation, repeated)]
     assert np.ptp(simulation.recording.vector("tip")[:, 1]) > 1e-3
-    assert np.array_equal(*same_rows, equal_nan=True)
+    assert_same_rows(simulation.recording, repeated.recording)
 
 
 @pytest.mark.parametrize("name", ["retract", "excise", "taut_incision"])

@@ -9,12 +9,13 @@ import pytest
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.recording.recording import WALL_TIMES, read_forces
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import read_scene
 from tests.scalpel_sim.hands.driven_runs import controls_of, through_the_body
+from tests.support.run_files import untimed
 
 EVERY = 0.1
 """Simulated time between two checkpoints [s]."""
@@ -65,8 +66,7 @@ def resume_in(folder, **others):
 
 def physics(folder):
     """Return the columns of `forces.csv` but wall times."""
-    recording = read_forces(folder / "forces.csv")
-    return recording.rows[:, [name not in WALL_TIMES for name in recording.columns]]
+    return untimed(read_forces(folder / "forces.csv"))
 
 
 def figures(folder):

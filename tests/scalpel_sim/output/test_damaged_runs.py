@@ -199,12 +199,6 @@ def test_a_scene_that_was_changed_is_put_back_and_kept_beside(
     assert f"{SCENE} was changed, damaged or removed; it is as it was again" in caplog.text
 
 
-def test_a_first_mesh_that_was_damaged_is_written_again(folder, whole, resume):
-    change(folder / INITIAL, nothing)
-    resume(folder)
-    expect_same(folder, whole)
-
-
 def test_a_run_goes_on_from_what_it_wrote_and_from_nothing_else(tmp_path, killed):
     written = {path.name: path.read_bytes() for path in killed.iterdir()}
     plan = resumption_of(killed).plan

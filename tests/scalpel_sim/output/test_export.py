@@ -10,7 +10,7 @@ import trimesh
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import ENDINGS, export_surface, surface_pieces
-from tests import strokes
+from tests.support import strokes
 from tissue import Material, Surface, TetrahedralMesh, Tissue, block, liver_lobe
 from tissue.mesh.pieces import piece_of_tetrahedra
 

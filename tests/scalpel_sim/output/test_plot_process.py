@@ -9,7 +9,7 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.plot_process import Plotter
-from tests.processes import environment
+from tests.support.processes import environment
 
 DRAWS = """
 import sys, time

@@ -11,8 +11,7 @@ from scalpel_sim import SCENES
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Engage, Release, Undo
 from scalpel_sim.recording.recording import COLUMNS, Recording, read_forces
-from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
-from scalpel_sim.runs.file_names import CHECKPOINT_FILES, PASSING_FILES, REPLAY_FRAMES
+from scalpel_sim.runs.file_names import PASSING_FILES, REPLAY_FRAMES
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
 from scalpel_sim.scene.scene import changed
@@ -31,11 +30,6 @@ from tissue import StateError
 pytestmark = pytest.mark.end_to_end
 
 SLAB = changed(SCENES["slab"], seconds=0.46)
-
-
-def frames_of(path):
-    """Return how many frames the run of a checkpoint had done."""
-    return read_checkpoint(path).head.mark.n_frames
 
 
 @pytest.fixture(scope="module")
@@ -79,27 +73,6 @@ def test_a_complete_run_leaves_no_checkpoint(whole):
     assert {path.name for path in whole.iterdir()} & set(PASSING_FILES) == set()
     with pytest.raises(UsageError, match="that run is complete"):
         resumption_of(whole)
-
-
-def test_a_damaged_checkpoint_is_left_out_and_the_one_before_is_taken(tmp_path, caplog):
-    kill_in(tmp_path, SLAB, 450)
-    with Checkpoints(tmp_path) as checkpoints:
-        last, before = (each.head.mark.n_frames for each in checkpoints.read())
-    newest = next(p for p in map(tmp_path.joinpath, CHECKPOINT_FILES) if frames_of(p) == last)
-    data = bytearray(newest.read_bytes())
-    data[len(data) // 2] ^= 1
-    newest.write_bytes(data)
-    assert resumption_of(tmp_path).n_frames == before < last
-    assert f"{newest.name}: it is no checkpoint of this version, or a part is" in caplog.text
-
-
-@pytest.mark.parametrize("name", ["forces.csv", "replay.part"])
-def test_a_run_goes_on_where_another_of_its_files_is_shorter_than_it_was(name, tmp_path, whole):
-    kill_in(tmp_path, SLAB, 333)
-    path = tmp_path / name
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    resume_in(tmp_path)
-    expect_same(tmp_path, whole)
 
 
 def test_a_frame_that_differs_from_its_row_is_an_error_that_names_it(tmp_path):

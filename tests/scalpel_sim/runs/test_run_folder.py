@@ -23,10 +23,10 @@ from scalpel_sim.output.plots import (
 from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_json
 from scalpel_sim.recording.recording import COLUMNS, TERMS, Recording, columns_of_hand, read_forces
-from scalpel_sim.runs.file_names import ENERGY_PLOT, FORCES, INITIAL, PLOT, SUMMARY
+from scalpel_sim.runs.file_names import ENERGY_PLOT, FORCES, PLOT, SUMMARY
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
-from tests.run_files import names_in
-from tissue import CutReport, Energies, MeshMeasures, Snapshot, block, pieces_of
+from tests.support.run_files import names_in
+from tissue import CutReport, Energies, MeshMeasures, Snapshot, pieces_of
 
 DT = 1e-3
 CUT_REPORT = CutReport(
@@ -89,20 +89,6 @@ def summary_of(
     )
 
 
-def test_a_recording_keeps_every_frame_when_it_grows():
-    rows = np.arange(3000.0 * len(COLUMNS)).reshape(3000, -1)
-    recording = Recording()
-    for row in rows:
-        recording.append(row)
-    assert np.array_equal(recording.rows, rows)
-
-
-def test_a_vector_is_its_three_columns():
-    recording = recorded(5)
-    columns = [recording.column(f"torque_{axis}_nm") for axis in "xyz"]
-    assert np.array_equal(recording.vector("torque"), np.transpose(columns))
-
-
 def test_forces_csv_reads_back_to_the_same_bits(tmp_path, plotter):
     recording = recorded(250)
     outputs = Outputs(tmp_path, plotter)
@@ -140,28 +126,6 @@ def test_a_path_that_is_a_file_is_wrong_use(tmp_path, plotter):
 def test_a_folder_that_cannot_be_made_is_a_failed_run(plotter):
     with pytest.raises(RunError, match=r"^/proc/nothing: cannot be written \("):
         Outputs(Path("/proc/nothing"), plotter)
-
-
-def test_the_mesh_of_an_output_folder_reads_back(tmp_path, plotter):
-    meshio = pytest.importorskip("meshio")
-    mesh = block((1, 1, 1), (0.01, 0.01, 0.01))
-    n = len(mesh.positions)
-    outputs = Outputs(tmp_path, plotter)
-    outputs.write_mesh(
-        INITIAL,
-        Snapshot(
-            mesh.positions + 0.001,
-            mesh.positions,
-            np.zeros((n, 3)),
-            np.ones(n),
-            mesh.tetrahedra,
-            np.zeros(n, bool),
-        ),
-    )
-    found = meshio.read(tmp_path / INITIAL)
-    assert np.array_equal(found.points, mesh.positions + 0.001)
-    assert np.array_equal(found.point_data["rest_position"], mesh.positions)
-    assert found.point_data["mass"].dtype == np.float64
 
 
 def test_the_plot_is_a_picture_that_shows_the_force(tmp_path, plotter):

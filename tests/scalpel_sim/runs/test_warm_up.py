@@ -16,7 +16,7 @@ from scalpel_sim.runs import warm_up
 from scalpel_sim.runs.warm_up import USUAL_SETS, KernelSet, compile_ahead, kernels_are_compiled
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
-from tests.processes import environment
+from tests.support.processes import environment
 from tissue import block
 from tissue.support import cache_directory
 

@@ -8,17 +8,12 @@ from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.asked_pieces import asked_pieces
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from tissue import Material, Snapshot, TetrahedralMesh, block
+from tests.scalpel_sim.strokes.test_asked_area import lying
+from tissue import Material, TetrahedralMesh, block
 
 SIZE = np.array([0.04, 0.06, 0.04])
 SLAB = block((4, 6, 4), SIZE)
 NODE_SIZE = 0.007
-
-
-def lying(mesh):
-    n = len(mesh.positions)
-    nothing = np.zeros((n, 3)), np.ones(n)
-    return Snapshot(mesh.positions, mesh.positions, *nothing, mesh.tetrahedra, np.zeros(n, bool))
 
 
 def along_y(x, low=-0.005, end=0.07):

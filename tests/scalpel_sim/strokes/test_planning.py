@@ -1,16 +1,15 @@
-import os
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from scalpel_sim.scene.strokes import PLANNED_STROKES
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.planning import check_meets, plan_stroke
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe, read_mesh
+from tests.support import bodies
+from tests.support.soundness import n_pieces
+from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe
 
 THROUGH = ("straight", "slanted", "curved")
 
@@ -25,16 +24,7 @@ BODIES = {
     "narrow": lambda: block((2, 4, 4), (0.015, 0.06, 0.06)),
     "sheet on edge": lambda: block((5, 1, 5), (0.10, 0.006, 0.10)),
     "organ": liver_lobe,
-}
-if "SCALPEL_SIM_TEST_MESHES" in os.environ:
-    FOLDER = Path(os.environ["SCALPEL_SIM_TEST_MESHES"])
-    for name, scale in (
-        ("bullet_banana.vtk", 1.0),
-        ("sofa_liver.msh", 0.01),
-        ("sofa_truthcylinder1.msh", 0.005),
-        ("sofaenv_tissue_volume.msh", 1.0),
-    ):
-        BODIES[name] = lambda name=name, scale=scale: read_mesh(FOLDER / name, scale)
+} | {file: partial(bodies.third_party_mesh, file) for file in bodies.FILES if bodies.FOLDER}
 
 
 def swept_side(stroke, points):
@@ -47,20 +37,6 @@ def swept_side(stroke, points):
     level = np.abs(np.einsum("npi,pi->np", offsets, forwards)).argmin(axis=1)
     normals = np.cross(edges, forwards)
     return np.einsum("ni,ni->n", offsets[np.arange(len(points)), level], normals[level]) > 0.0
-
-
-def pieces(tetrahedra):
-    """Return the number of parts of tetrahedra, which are connected through faces."""
-    faces = np.sort(
-        tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1
-    )
-    face = np.unique(faces, axis=0, return_inverse=True)[1].ravel()
-    owner = np.repeat(np.arange(len(tetrahedra)), 4)
-    order = np.argsort(face, kind="stable")
-    same = face[order][1:] == face[order][:-1]
-    pairs = owner[order][:-1][same], owner[order][1:][same]
-    n = len(tetrahedra)
-    return connected_components(coo_array((np.ones(len(pairs[0])), pairs), shape=(n, n)))[0]
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -76,7 +52,7 @@ def test_a_stroke_clean_through_separates_left_from_right(body, name):
     assert len(set(side[left])) <= 1
     assert len(set(side[right])) <= 1
     if body not in ("tower", "narrow", "grid2"):  # their cells are too coarse to count parts by
-        assert pieces(mesh.tetrahedra[side]) == pieces(mesh.tetrahedra[~side]) == 1
+        assert n_pieces(mesh.tetrahedra[side]) == n_pieces(mesh.tetrahedra[~side]) == 1
     assert 0.2 < mesh_share(mesh, side) < 0.8
 
 

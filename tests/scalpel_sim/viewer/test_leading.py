@@ -183,10 +183,6 @@ def test_a_page_without_the_token_is_not_heard(driven_viewer):
     assert heard(driven_viewer, own_origin(driven_viewer), TOKEN) == []
 
 
-def test_a_program_that_says_no_origin_is_not_heard(driven_viewer):
-    assert heard(driven_viewer, None, token_in(driven_viewer.url)) == []
-
-
 def test_a_page_of_another_origin_opens_no_socket(driven_viewer):
     with pytest.raises(HTTPClientError) as refused:
         heard(driven_viewer, "http://evil.example", token_in(driven_viewer.url))
@@ -200,12 +196,6 @@ def test_the_hand_lets_go_when_the_viewer_is_killed(driven_viewer):
         assert time.monotonic() < end
         time.sleep(0.02)
     assert list(driven_viewer.commands) == [Release()]
-
-
-def test_no_other_page_shows_this_one_in_a_frame(driven_viewer):
-    with urllib.request.urlopen(driven_viewer.url) as answer:
-        assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
-        assert answer.headers["X-Frame-Options"] == "DENY"
 
 
 def test_a_page_that_only_shows_has_no_token():

@@ -11,9 +11,9 @@ from PIL import Image
 
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
-from tests.browser import UNTIL_DRAWN, WINDOW, local_file, new_tab, pixels_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
+from tests.support.browser import UNTIL_DRAWN, WINDOW, local_file, new_tab, pixels_of
 
 pytestmark = pytest.mark.browser
 
@@ -234,12 +234,6 @@ def test_a_key_saves_the_picture_with_heading_and_readings_under_scene_and_time(
     texts[:70] = texts[-230:, :380] = True  # where the heading and the readings are
     assert differs[~texts].mean() < 0.01, "the scene is that of the screen"
     assert differs[:70].any() and differs[-230:, :380].any()
-
-
-def test_the_button_saves_a_picture_too(tab):
-    with tab.expect_download() as download:
-        tab.click("#save-picture")
-    assert saved(download.value).std() > 5.0
 
 
 def test_the_scale_is_in_the_picture(tab):

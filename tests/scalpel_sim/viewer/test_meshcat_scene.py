@@ -17,9 +17,9 @@ from scalpel_sim import Viewer
 from scalpel_sim.errors import UsageError
 from scalpel_sim.viewer import meshcat_scene
 from scalpel_sim.viewer.model_shapes import body_poses
-from tests.browser import new_tab
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
+from tests.support.browser import new_tab
 
 NO_WAIT = 0.25
 """Longest time of a call of `show` on a busy machine [s]. If it waited for a server that does not

@@ -10,10 +10,10 @@ from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.page import live_page
 from scalpel_sim.viewer.page.policy import policy_of
-from tests.browser import TIMEOUT, WINDOW, local_file
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 from tests.scalpel_sim.viewer.test_replay import write_cut
+from tests.support.browser import TIMEOUT, WINDOW, local_file
 
 WATCHED = """
     let nViolations = 0;
@@ -89,6 +89,7 @@ def test_the_live_page_is_sent_with_its_policy():
         assert f"connect-src 'self' ws://{viewer.url.split('/')[2]};" in policy
         assert policy.endswith("frame-ancestors 'none'")
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert answer.headers["X-Frame-Options"] == "DENY"
         assert answer.headers["Referrer-Policy"] == "no-referrer"
 
 

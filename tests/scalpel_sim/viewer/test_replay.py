@@ -12,9 +12,9 @@ from scalpel_sim.viewer import page
 from scalpel_sim.viewer import replay as replay_module
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import BYTES_PER_TRIANGLE, ReplayWriter
-from tests.browser import WINDOW, local_file, new_tab, pixels, pixels_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
+from tests.support.browser import WINDOW, local_file, new_tab, pixels, pixels_of
 from tissue import Energies
 
 N_PIXELS = WINDOW["width"] * WINDOW["height"]

@@ -15,9 +15,9 @@ from scalpel_sim import Viewer
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.viewer import viewer as viewer_module
 from scalpel_sim.viewer.model_shapes import body_poses
-from tests.browser import WINDOW, new_tab, pixels_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
+from tests.support.browser import WINDOW, new_tab, pixels_of
 
 NO_WAIT = 0.25
 """Longest time of a call of `show` on a busy machine [s]. Usually it is 20 microseconds; if it

@@ -176,15 +176,6 @@ def test_a_faster_edge_meets_more_resistance(held):
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 3.0 * THRESHOLD, rtol=1e-9)
 
 
-def test_skin_resists_a_faster_edge_as_the_tissue_below_does(held):
-    held.set_toughness(toughness=TOUGH, toughness_exponent=1.0, toughness_speed=0.1)
-    held.anchors.speed[:] = 0.2  # three times as tough
-    assert held.anchors.at_skin.all()
-    before = held.anchors.rest.copy()
-    held.slip(edge_at(0.009 + 2.9 * THRESHOLD))
-    np.testing.assert_array_equal(held.anchors.rest, before)
-
-
 def test_slipping_further_costs_toughness_times_area(held):
     """Past the threshold, an advance of 1 um over the whole edge dissipates J l 1 um."""
     for i in range(4000):

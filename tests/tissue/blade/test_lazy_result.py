@@ -42,30 +42,6 @@ def test_later_steps_change_nothing_but_the_views_of_contacts():
     assert bits(results[-1].contacts) == bits(copies[-1].contacts)
 
 
-def test_a_field_is_made_once(result):
-    for field in StepResult._fields:
-        assert getattr(result, field) is getattr(result, field)
-
-
-def test_it_is_a_tuple_of_all_fields_in_order(result):
-    fields = [getattr(result, field) for field in StepResult._fields]
-    assert isinstance(result, StepResult) and len(result) == len(fields)
-    assert all(a is b for a, b in zip(result, fields, strict=True))
-    assert all(result[i] is field for i, field in enumerate(fields))
-    assert result[-3:] == tuple(fields)[-3:]
-    wrench, *_ = result
-    assert wrench is fields[0] and wrench in result
-    assert result._asdict().keys() == dict(zip(StepResult._fields, fields, strict=True)).keys()
-
-
-def test_it_equals_a_plain_result_of_the_same_fields_and_no_other(result):
-    plain = StepResult(*result)
-    assert type(plain) is StepResult
-    assert result == plain and plain == result and result == tuple(result)
-    other = plain._replace(n_nodes=-1)
-    assert result != other and other != result
-
-
 def test_copies_are_plain_results(result):
     for copied in (copy.copy(result), copy.deepcopy(result), pickle.loads(pickle.dumps(result))):
         assert type(copied) is StepResult

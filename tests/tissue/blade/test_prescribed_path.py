@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue import block
 from tissue.blade.prescribed_path import begin_path, prescribe_path

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests.bodies import sides
+from tests.support.bodies import sides
 from tissue import BladeSegment, BladeShape, BladeSweep, Material, Tissue, block
 
 MESH = block((6, 6, 3), (0.04, 0.04, 0.02))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
-from tests.test_contact import pressed_blocks
+from tests.support import bodies, strokes
+from tests.system.contact.test_contact import pressed_blocks
 from tissue import Material, Tissue, block
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.overlaps import joined
+from tests.support.overlaps import joined
 from tissue import block
 from tissue.contact.geometry.faces import new_faces, update_normals, with_found_pieces
 from tissue.contact.search.edge_pairs import new_edge_pairs, pair_edges

@@ -61,11 +61,6 @@ def test_a_cleared_table_is_empty_and_can_be_filled_again():
     assert table.item[slot_of(table, keys, keys[7])] == 7
 
 
-@pytest.mark.parametrize(("n_slots", "rounded"), [(1, 1), (5, 8), (64, 64)])
-def test_the_slots_are_a_power_of_two(n_slots, rounded):
-    assert len(new_hash_table(n_slots).item) == rounded
-
-
 def test_keys_that_follow_each_other_are_spread_over_the_table():
     """Nodes of an edge or a face have similar numbers; long runs of filled slots are slow."""
     table = new_hash_table(4096)

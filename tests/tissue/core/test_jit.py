@@ -47,16 +47,7 @@ def test_the_same_sources_share_a_cache(copy):
     assert directory_of(copy).name == directory_of(PACKAGE).name == cache_directory().name
 
 
-@pytest.mark.parametrize(
-    "source",
-    [
-        "core/vec3.py",
-        "elasticity/springs.py",
-        "core/jit.py",
-        "contact/spatial_hash.py",
-        "cutting/bielser_1998/case_table.py",
-    ],
-)
+@pytest.mark.parametrize("source", ["core/vec3.py", "cutting/bielser_1998/case_table.py"])
 def test_editing_any_source_changes_the_cache(copy, source):
     before = directory_of(copy)
     (copy / source).write_text((copy / source).read_text() + "# edited\n")

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.materials import SPRINGS
+from tests.support.materials import SPRINGS
 from tissue import SolverSettings, Tissue, block
-from tissue.core import simd
 from tissue.core.jit import kernel
 from tissue.core.simd import (
     eight_points,
@@ -115,7 +114,3 @@ def test_a_single_point_is_copied_without_what_follows_it():
 
 def _copy_last(points, rows):
     store_point(rows, 0, point(points, 2))
-
-
-def test_a_vector_is_eight_wide():
-    assert len(simd.lanes(1.0)) == simd.WIDTH

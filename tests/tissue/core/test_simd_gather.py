@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from tissue.core.jit import kernel
-from tissue.core.simd import load_lanes, store_lanes
+from tissue.core.simd import load_lanes
 from tissue.core.simd_gather import (
     first_bit,
-    larger,
     larger_bits,
-    largest,
     natural,
     sum_of_eight,
 )
@@ -30,20 +28,6 @@ def test_values_are_gathered_and_summed_up():
     gather(VALUES, OF, expected)
     np.testing.assert_array_equal(out, expected)
     assert out[0] == pytest.approx(VALUES[OF[2:10]].sum(), rel=1e-15)
-
-
-def compare(values, out):
-    store_lanes(out, 0, larger(load_lanes(values, 0), load_lanes(values, 8)))
-    out[8] = largest(load_lanes(values, 16))
-
-
-def test_the_larger_of_two_and_the_largest_of_eight():
-    out, expected = np.zeros((2, 9))
-    kernel(compare)(VALUES, out)
-    compare(VALUES, expected)
-    np.testing.assert_array_equal(out, expected)
-    np.testing.assert_array_equal(out[:8], np.maximum(VALUES[:8], VALUES[8:16]))
-    assert out[8] == VALUES[16:24].max()
 
 
 def compare_bits(values, out):

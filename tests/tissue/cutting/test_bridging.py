@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.tissue.kernels_of import cut_of
-from tissue.cutting.blade_path import put_on_lattice
+from tests.tissue.cutting import upright_edge
 from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.cut_surface import note_side, on_sheet, side_of
 from tissue.mesh.changes import note_dirty
@@ -15,15 +13,7 @@ pytestmark = pytest.mark.kernel
 
 def corner(x: float, low: float = -1.0):
     """Return the corner of a unit cube, active in the last step, with a blade plane at `x`."""
-    cut = cut_of(bodies.unit_tetrahedron())
-    path = cut.path
-    path.t1[:] = [[x, 0.3, low], [x, 0.3, 2.0]]
-    path.t0[:] = path.t1 - [0.0, 1.0, 0.0]
-    path.forward[:] = [0.0, 1.0, 0.0]
-    path.sideways[:] = [1.0, 0.0, 0.0]
-    path.member[:] = True
-    path.linked[0] = True
-    put_on_lattice(path, cut.body.lattice)
+    cut = upright_edge.corner(x, ahead=0.3, low=low)
     cut.scratch.active[0] = 0
     cut.scratch.n_active = 1
     remember_active(cut)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue import block
 from tissue.cutting.blade_path import path_travel, put_on_lattice

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests import bodies, soundness
+from tests.support import bodies, soundness
 from tests.tissue.kernels_of import cut_of
 from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.collision_detection import find_active_tetrahedra

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
 
-from tests import bodies
+from tests.support import bodies
 from tissue import block
 from tissue.cutting.minimum_cut import clear_lips, minimum_cut, new_flow_graph, put_on_lip
 from tissue.geometry.tetrahedron import face_area

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tissue import Material, MeshError, SolverSettings, TetrahedralMesh, Tissue
 from tissue.cutting import workspace
 from tissue.mesh import changes

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive, soundness
+from tests.support import bodies, naive, soundness
+from tests.tissue.cutting.upright_edge import put_edge
 from tests.tissue.kernels_of import cut_of
 from tissue import block
-from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.cut_surface import decide_side, note_side
 from tissue.cutting.separation import open_sheet, tetrahedron_side
 from tissue.cutting.workspace import flag
@@ -16,22 +16,10 @@ from tissue.mesh.changes import NODES, clear_changes
 pytestmark = pytest.mark.kernel
 
 
-def blade_in_plane(cut, x: float, sideways: float = 1.0) -> None:
-    """Place an upright edge at `x`, longer than the body and facing along y."""
-    path = cut.path
-    path.t1[:] = [[x, 0.5, -1.0], [x, 0.5, 2.0]]
-    path.t0[:] = path.t1 - [0.0, 0.1, 0.0]
-    path.forward[:] = [0.0, 1.0, 0.0]
-    path.sideways[:] = [sideways, 0.0, 0.0]
-    path.member[:] = True
-    path.linked[0] = True
-    put_on_lattice(path, cut.body.lattice)
-
-
 def two_halves():
     """Return a unit cube of 2 x 1 x 1 cells with its middle plane on the cut surface."""
     cut = cut_of(block((2, 1, 1), (1.0, 1.0, 1.0)))
-    blade_in_plane(cut, 0.5)
+    put_edge(cut, 0.5)
     x = cut.body.rest[: cut.body.n_nodes, 0]
     for node in np.flatnonzero(x == 0.5):
         flag(cut, node)
@@ -87,7 +75,7 @@ def test_separating_an_open_cut_surface_again_changes_nothing():
 
 def test_a_face_with_a_node_off_the_cut_surface_is_not_cut():
     cut = cut_of(block((2, 1, 1), (1.0, 1.0, 1.0)))
-    blade_in_plane(cut, 0.5)
+    put_edge(cut, 0.5)
     on = np.flatnonzero(cut.body.rest[:12, 0] == 0.5)
     for node in on[:2]:
         flag(cut, node)
@@ -99,7 +87,7 @@ def test_a_face_with_a_node_off_the_cut_surface_is_not_cut():
 def test_a_single_cut_face_inside_doubles_no_node():
     """The tetrahedra around its rim are still connected."""
     cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)))
-    blade_in_plane(cut, 0.5)
+    put_edge(cut, 0.5)
     tetrahedra = mesh_of(cut)
     rest = cut.body.rest
     faces = soundness.faces_of(tetrahedra)
@@ -114,7 +102,7 @@ def test_a_single_cut_face_inside_doubles_no_node():
 
 def test_the_last_face_of_a_tetrahedron_is_not_cut():
     cut = cut_of(bodies.two_tetrahedra())
-    blade_in_plane(cut, 0.4)
+    put_edge(cut, 0.4)
     for node in (1, 2, 3):
         flag(cut, node)
     open_sheet(cut)
@@ -143,7 +131,7 @@ def test_links_after_a_cut_are_those_built_from_scratch():
 def one_tetrahedron(*on_sheet: int):
     """Return the corner of a cube with the given nodes on the cut surface at x = 0.3."""
     cut = cut_of(bodies.unit_tetrahedron())
-    blade_in_plane(cut, 0.3)
+    put_edge(cut, 0.3)
     for node in on_sheet:
         flag(cut, node)
     return cut

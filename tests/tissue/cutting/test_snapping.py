@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.tissue.kernels_of import cut_of
+from tests.tissue.cutting import upright_edge
 from tissue.core.vec3 import Vec3
-from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.cut_surface import begin_sheet, on_sheet, side_of
 from tissue.cutting.snapping import insert_crossing, insert_in_face, snap_distance, sort_crossings
 from tissue.cutting.workspace import flag
@@ -19,15 +17,7 @@ SIZE = 1.0 / np.sqrt(3.0)
 
 def corner(x: float, **quality):
     """Return the corner of a unit cube with a blade plane at `x`, its side +1 towards +x."""
-    cut = cut_of(bodies.unit_tetrahedron())
-    path = cut.path
-    path.t1[:] = [[x, 0.5, -1.0], [x, 0.5, 2.0]]
-    path.t0[:] = path.t1 - [0.0, 1.0, 0.0]
-    path.forward[:] = [0.0, 1.0, 0.0]
-    path.sideways[:] = [1.0, 0.0, 0.0]
-    path.member[:] = True
-    path.linked[0] = True
-    put_on_lattice(path, cut.body.lattice)
+    cut = upright_edge.corner(x)
     return cut.replaced(limits=cut.limits.replaced(**quality))
 
 

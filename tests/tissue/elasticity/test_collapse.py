@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from tests.soundness import volumes
+from tests.support.soundness import volumes
 from tests.tissue.kernels_of import dense_modes, springs_of
 from tissue import FloatArray, Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.collapse import (
@@ -200,16 +200,6 @@ def test_what_is_to_resist_is_listed_though_not_all_is_looked_at_each_time(seed)
         body.positions[: body.n_nodes] += dt * velocities
         j = volumes(body.positions, mesh.tetrahedra) / volumes(mesh.positions, mesh.tetrahedra)
         assert set(np.flatnonzero(j < J_LIMIT)) <= set(collapsing.listed[: collapsing.n])
-
-
-@pytest.mark.kernel
-def test_a_body_at_rest_is_looked_at_once():
-    collapsing, body = flat(TWO, TWO.positions)
-    slack = collapsing.slack
-    assert slack == pytest.approx(1.0 - J_LISTED)
-    for _ in range(3):
-        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, 0.0, SIZE, 1e-3)
-        assert collapsing.slack == slack
 
 
 def inverted(tissue: Tissue) -> int:

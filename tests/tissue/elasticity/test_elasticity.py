@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.materials import SPRINGS
+from tests.support import bodies
+from tests.support.materials import SPRINGS
 from tissue import Material
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.elasticity import Elasticity

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive, naive_solid
+from tests.support import bodies, naive, naive_solid
 from tests.tissue.cutting.test_stellar_subdivision import split_all
 from tests.tissue.kernels_of import cut_of, springs_of
 from tests.tissue.solids import LAWS, built, law_of, moved, solid_of

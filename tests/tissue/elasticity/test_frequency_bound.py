@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from tests import bodies, incisions
+from tests.support import bodies, incisions
 from tests.tissue.solids import LAWS, SolidBody, highest_frequency, lame, law_of, moved, solid_of
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.core.jit import is_compiling

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.solids import LAWS, highest_frequency, law_of, solid_of
 from tissue import block
 from tissue.elasticity.frequency_refinement import tighten

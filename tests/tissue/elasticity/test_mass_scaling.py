@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies, incisions, strokes
-from tests.materials import SPRINGS
+from tests.support import bodies, incisions, strokes
+from tests.support.materials import SPRINGS
 from tests.tissue.solids import SolidBody, highest_frequency, moved
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.limited_frequency import limited_frequency

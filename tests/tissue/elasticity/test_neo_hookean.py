@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive_solid
+from tests.support import bodies, naive_solid
 from tests.tissue.cutting.test_stellar_subdivision import split_all
-from tests.tissue.kernels_of import cut_of, springs_of
+from tests.tissue.kernels_of import cut_of
 from tests.tissue.solids import (
     LAWS,
     YOUNG_MODULUS,
     SolidBody,
-    built,
-    j_of,
     lame,
     law_of,
     moved,
@@ -147,27 +145,6 @@ def test_the_moduli_hold_at_small_strain():
         np.testing.assert_allclose(swollen[0], expected, rtol=1e-5, atol=1e-8)
 
 
-@needs_speed
-@pytest.mark.parametrize("averaged", [False, True])
-@pytest.mark.parametrize("seed", range(3))
-def test_25_a_block_recovers_from_random_positions_with_inverted_tetrahedra(averaged, seed):
-    """A unit block between two plates; a free block can get tangled."""
-    mesh = block((3, 3, 3), (1.0, 1.0, 1.0))
-    held = bodies.sides(mesh)
-    scattered = np.random.default_rng(seed).uniform(size=mesh.positions.shape)
-    scattered[held] = mesh.positions[held]
-    assert (j_of(mesh, scattered) < 0.0).sum() > 50
-    law = law_of(0.45, averaged)
-    stiffer = law.replaced(
-        mu=10 * law.mu,
-        lam_of_tetrahedra=10 * law.lam_of_tetrahedra,
-        lam_of_nodes=10 * law.lam_of_nodes,
-    )
-    at_rest = solid_of(mesh, stiffer, held).relaxed(scattered, seconds=2.0, drag=20.0)
-    assert j_of(mesh, at_rest).min() > 0.999
-    np.testing.assert_allclose(at_rest, mesh.positions, atol=1e-4)
-
-
 SPLITS = [(int(1e6 * a), bool(b > 0.5), 0.2 + 0.6 * c, 0.2 + 0.6 * d)
           for a, b, c, d in np.random.default_rng(7).random((100, 4))]  # fmt: skip
 """A hundred stellar splits without a cut: which tetrahedron, whether a face, and where."""
@@ -209,15 +186,3 @@ def _sag(mesh, law):
     weight = np.outer(masses, [0.0, 0.0, -1.0])
     x = solid.relaxed(mesh.positions, seconds=2.0, drag=12.0, pull=weight)
     return float(masses @ (mesh.positions - x)[:, 2] / masses.sum())
-
-
-def test_20_forces_after_splits_are_those_of_the_mesh_built_from_scratch():
-    cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)))
-    split_all(cut, SPLITS[:20])
-    springs_of(cut.body)
-    n = cut.body.n_nodes
-    mesh = TetrahedralMesh(cut.body.rest[:n], cut.body.tetrahedra[: cut.body.n_tetrahedra])
-    x = moved(mesh, 0.02)
-    for law in LAWS.values():
-        expected = solid_of(mesh, law).forces(x)
-        np.testing.assert_array_equal(built(cut.body, law).forces(x), expected)

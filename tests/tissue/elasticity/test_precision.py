@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tests.tissue.solids import LAWS, moved, solid_of
 from tissue import Material, SolverSettings, Tissue
 from tissue.core.jit import is_compiling

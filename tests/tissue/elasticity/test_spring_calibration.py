@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.materials import SPRINGS
+from tests.support import bodies
+from tests.support.materials import SPRINGS
 from tissue import Material, block
 from tissue.elasticity.spring_calibration import calibrated, on_surface, spring_error
 
@@ -27,11 +27,6 @@ def test_springs_on_a_random_mesh_are_5_to_16_percent_too_stiff_and_nearly_isotr
     error = spring_error(RANDOM, UNIT)
     assert error.affine == pytest.approx((1.16, 0.21, 0.73), rel=0.05)
     assert error.relaxed[:2] == pytest.approx((1.05, 0.21), rel=0.05)
-
-
-def test_relaxed_nodes_make_the_body_softer():
-    error = spring_error(RANDOM, UNIT)
-    assert error.relaxed.young_modulus < error.affine.young_modulus
 
 
 @pytest.mark.parametrize("mesh", [CELLS, bodies.jittered(4, seed=2)], ids=["cells", "random"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive
+from tests.support import bodies, naive
 from tests.tissue.kernels_of import (
     DENSITY,
     YOUNG_MODULUS,

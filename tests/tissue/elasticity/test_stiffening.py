@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.solids import lame, solid_of
 from tissue.elasticity.energy_density import stiffening
 from tissue.elasticity.stiffening import LARGEST_EXPONENT, exponential_less_one

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies, naive
-from tests.materials import SPRINGS
+from tests.support import bodies, naive
+from tests.support.materials import SPRINGS
 from tissue import Material, block
 from tissue.elasticity.stiffness_matrix import edge_springs, masses, stiffness_matrix
 

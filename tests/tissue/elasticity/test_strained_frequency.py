@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, incisions
+from tests.support import bodies, incisions
 from tests.tissue.solids import LAWS, SolidBody, highest_frequency, law_of, solid_of
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive, naive_runge_kutta
+from tests.support import bodies, naive, naive_runge_kutta
 from tests.tissue.kernels_of import YOUNG_MODULUS, Network, network_of, oscillator
-from tissue.core.jit import is_compiling
-from tissue.elasticity import internal_forces as elastic
 
 pytestmark = pytest.mark.kernel
 
@@ -44,15 +42,6 @@ def test_a_step_is_that_of_nystroem_in_numpy(damping):
     np.testing.assert_allclose(network.body.velocities, v, rtol=0.0, atol=1e-12)
 
 
-def test_the_classical_method_on_two_levels_is_the_classical_method():
-    network = network_of(MESH, **DAMPED)
-    x, v = perturb(network)
-    two_level = naive_runge_kutta.two_levels(accelerations_of(network), x, v, STEP)
-    np.testing.assert_allclose(
-        naive_runge_kutta.classical(accelerations_of(network), x, v, STEP), two_level, rtol=1e-13
-    )
-
-
 def test_both_forms_have_the_errors_of_theory():
     """x'' = -w^2 x - 2 zeta w x', zeta = 0.1, two periods in 640 steps: 4.07e-9 and 1.67e-9."""
     w, zeta, n, seconds = 2.0 * np.pi, 0.1, 640, 2.0
@@ -76,30 +65,3 @@ def test_both_forms_have_the_errors_of_theory():
             lambda x, v: -w * w * x - 2.0 * zeta * w * v, x, v, seconds / n
         )
     assert error(x, v) == pytest.approx(4.07e-9, rel=0.05)
-
-
-@pytest.mark.skipif(is_compiling(), reason="calls are counted where the JIT is off")
-@pytest.mark.parametrize(
-    ("damping", "expected"), [({}, (3, 0)), ({"viscous_damping": 3.0}, (3, 0)), (DAMPED, (3, 4))]
-)
-def test_a_step_evaluates_springs_three_times_and_dampers_four_times(
-    damping, expected, monkeypatch
-):
-    calls = {"elastic": 0, "damping": 0}
-
-    def counted(name, kinds):
-        function = getattr(elastic, name)
-
-        def counting(*arguments):
-            for kind in kinds:
-                calls[kind] += 1
-            return function(*arguments)
-
-        monkeypatch.setattr(elastic, name, counting)
-
-    counted("elastic_force", ["elastic"])
-    counted("damping_force", ["damping"])
-    counted("elastic_and_damping_force", ["elastic", "damping"])
-    network_of(MESH, **damping).advance(STEP)
-    n = len(MESH.positions)
-    assert (calls["elastic"] / n, calls["damping"] / n) == expected

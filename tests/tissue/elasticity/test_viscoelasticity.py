@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.naive_viscoelasticity import Relaxation
+from tests.support import bodies
+from tests.support.naive_viscoelasticity import Relaxation
 from tests.tissue.kernels_of import cut_of, springs_of
 from tests.tissue.solids import LAWS, built, law_of, moved, relax, solid_of
 from tissue.cutting.stellar_subdivision import split_edge

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests import naive
+from tests.support import naive
 from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import (
     LATTICE_LIMIT,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import naive
+from tests.support import naive
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 from tissue.geometry.tetrahedron import (
     altitude,

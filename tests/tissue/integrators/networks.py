@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.kernels_of import Network, network_of
 from tissue import BoolArray, FloatArray, Hierarchical
 from tissue.blade.edge import NOWHERE

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tissue import (
     Material,
     SolverSettings,

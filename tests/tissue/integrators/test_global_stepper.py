@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests import incisions
+from tests.support import incisions
 from tissue import Material, SolverSettings, Tissue, TissueError, block
 from tissue.integrators.step_choice import LONGEST_MOTION, MOTION_BETWEEN_STRAIN_BOUNDS
 

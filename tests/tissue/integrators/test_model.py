@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tissue import BladeShape, Geom, Material, Tissue
 
 MESH = bodies.jittered(3, 0)

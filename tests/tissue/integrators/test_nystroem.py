@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive_runge_kutta
+from tests.support import bodies, naive_runge_kutta
 from tests.tissue.integrators.test_runge_kutta import order
 from tests.tissue.kernels_of import network_of
 from tissue import block

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.materials import SPRINGS
+from tests.support.materials import SPRINGS
 from tissue import Hierarchical, Material, Verlet
 from tissue.integrators.options import Global, checked_relaxation
 

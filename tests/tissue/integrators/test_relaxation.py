@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests import bodies, strokes
-from tests.test_determinism import fingerprint
+from tests.support import bodies, strokes
+from tests.system.state.test_determinism import fingerprint
 from tissue import BladeShape, Material, SolverSettings, Tissue
 from tissue.integrators.hierarchical.stepper import relax_in_stages
 from tissue.mesh.tetrahedron_grid import no_grid
@@ -45,7 +45,7 @@ class InStages:
 def test_one_call_gives_the_bits_of_the_stages(material, relaxation):
     stroke = strokes.slanted(MESH)
     whole, staged = (body(material, relaxation, BladeShape()) for _ in range(2))
-    staged._integrator = InStages(staged._global_stepper)
+    staged._stages.integrator = InStages(staged._stages.global_stepper)
     expected = fingerprint(staged, strokes.make(staged, stroke))
     assert fingerprint(whole, strokes.make(whole, stroke)) == expected
 

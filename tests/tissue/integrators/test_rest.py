@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, TissueError, block
 from tissue.integrators.equilibrium import LONGEST_SETTLING
 

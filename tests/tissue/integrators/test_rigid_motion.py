@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.bodies import jittered
+from tests.support.bodies import jittered
 from tissue.core.simd import room_for_points
 from tissue.integrators.rigid_motion import add_rigid_part, rigid_motion
 from tissue.mesh.body import build_body

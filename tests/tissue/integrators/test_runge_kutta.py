@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests.support import bodies, strokes
 from tests.tissue.kernels_of import dense_modes, network_of, oscillator
 from tissue import Tissue, block
 from tissue.integrators.stability import STABILITY_LIMIT, largest_stable_step

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
-from tests.materials import SPRINGS
+from tests.support import bodies, strokes
+from tests.support.materials import SPRINGS
 from tissue import Global, Material, SolverSettings, Tissue
 from tissue.integrators import threaded
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.integrators.test_runge_kutta import order
 from tests.tissue.kernels_of import elastic_of, network_of
 from tissue import block

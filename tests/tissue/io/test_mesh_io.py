@@ -28,9 +28,11 @@ FILES = {
             BLOCK, form, order, header, z
         )
         for form in ("binary", "appended")
-        for order in "<>"
-        for header in ("UInt32", "UInt64")
-        for z in (False, True)
+        for order, header, z in (
+            ("<", "UInt64", False),
+            ("<", "UInt64", True),
+            (">", "UInt32", True),
+        )
     },
     "appended base64.vtu": write.vtu(BLOCK, "appended", appended_is_raw=False),
     "appended base64 zlib.vtu": write.vtu(
@@ -118,7 +120,7 @@ def test_a_file_too_large_is_refused_before_it_is_read(tmp_path):
     assert "expected at most 2147483647 bytes, found 2147483648" in refusal(tmp_path / "large.vtu")
 
 
-@pytest.mark.parametrize("suffix", ["", ".txt", ".mesh", ".inp"])
+@pytest.mark.parametrize("suffix", ["", ".txt"])
 def test_an_unknown_suffix_is_refused_with_the_known_ones(suffix, tmp_path):
     message = refusal_of(tmp_path, "mesh" + suffix, FILES["gmsh 1.0.msh"])
     assert ".msh, .vtk, .vtu" in message
@@ -157,15 +159,13 @@ def test_a_file_of_another_format_is_refused_with_what_was_expected_and_found(tm
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize("part", [0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
 def test_a_truncated_file_is_refused(name, part, tmp_path):
     data = FILES[name]
     assert "expected" in refusal_of(tmp_path, name, data[: int(part * len(data))])
 
 
-@pytest.mark.parametrize(
-    "wrong", [b"10", b"-5", b"4000000000", b"99999999999999999999", b"x", b"1.5"]
-)
+@pytest.mark.parametrize("wrong", [b"10", b"-5", b"99999999999999999999", b"1.5"])
 @pytest.mark.parametrize(
     ("name", "count"),
     [

@@ -4,7 +4,7 @@ import contextlib
 
 import pytest
 
-from tests.run_files import names_in
+from tests.support.run_files import names_in
 from tissue.support import new_whole_file, remove_unfinished, whole_file
 
 

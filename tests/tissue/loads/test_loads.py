@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import bodies
-from tests.materials import SPRINGS
+from tests.support import bodies
+from tests.support.materials import SPRINGS
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block, fixed_nodes
 
 SIZE = (0.04, 0.02, 0.02)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests.materials import SPRINGS
+from tests.support.materials import SPRINGS
 from tissue import (
     BladeSegment,
     BladeSweep,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive
+from tests.support import bodies, naive
 from tissue import block
 from tissue.core.vec3 import Vec3
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tissue.mesh.body import build_body
 from tissue.mesh.finite_motion import is_motion_finite
 

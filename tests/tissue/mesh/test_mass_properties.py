@@ -9,7 +9,7 @@ the tensors of inertia differ by a known sum.
 import numpy as np
 import pytest
 
-from tests import strokes
+from tests.support import strokes
 from tissue import Material, Snapshot, Tissue, block, liver_lobe
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.io import mesh_writers
 from tissue import TetrahedralMesh, read_mesh
 from tissue.io import mesh_io

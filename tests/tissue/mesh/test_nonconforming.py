@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive
+from tests.support import bodies, naive
 from tissue import block
 from tissue.mesh.body import build_body, is_open
 from tissue.mesh.nonconforming import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, soundness, strokes
+from tests.support import bodies, soundness, strokes
 from tissue import Material, Tissue, block
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
 
@@ -64,16 +64,6 @@ def test_a_spinning_piece_has_the_given_velocities(cut):
     np.testing.assert_allclose(small.angular_velocity, w, atol=1e-9)
     np.testing.assert_allclose(small.angular_momentum, small.inertia @ w, atol=1e-15)
     np.testing.assert_allclose(small.inertia, small.inertia.T)
-
-
-def test_the_inertia_of_a_piece_is_that_of_its_nodes(cut):
-    body, piece = cut.snapshot(), cut.pieces()[0]
-    nodes = np.unique(body.tetrahedra[cut.piece_of_tetrahedra() == 0])
-    expected = np.zeros((3, 3))
-    for node in nodes:
-        r = body.positions[node] - piece.centre
-        expected += body.masses[node] * (r @ r * np.eye(3) - np.outer(r, r))
-    np.testing.assert_allclose(piece.inertia, expected, rtol=1e-9)
 
 
 def test_equal_pieces_are_in_the_order_of_their_tetrahedra():

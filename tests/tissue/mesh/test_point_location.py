@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue.core.vec3 import Vec3, lerp
 from tissue.cutting.stellar_subdivision import split_edge

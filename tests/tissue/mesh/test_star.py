@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive
+from tests.support import bodies, naive
 from tissue import block
 from tissue.mesh.body import build_body
 from tissue.mesh.star import LARGEST_STAR, edge_star, mean_node_size, no_visits, node_size, star
@@ -47,9 +47,3 @@ def test_node_size_is_the_smallest_altitude_around(mesh, around):
     sizes = [naive.node_size(mesh.positions, mesh.tetrahedra, node) for node in range(n_nodes)]
     assert [node_size(body, visits, k, out) for k in range(n_nodes)] == pytest.approx(sizes)
     assert mean_node_size(body, visits, out) == pytest.approx(np.mean(sizes))
-
-
-def test_a_new_search_does_not_depend_on_the_last(mesh, around):
-    body, visits, out = around
-    first = star(body, visits, 0, body.node_tetrahedron[0], out)
-    assert star(body, visits, 0, body.node_tetrahedron[0], out) == first

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, soundness, strokes
+from tests.support import bodies, soundness, strokes
 from tissue import Tissue, block
 from tissue.mesh.body import CUT, build_body
 from tissue.mesh.pieces import label_pieces

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.overlaps import joined
+from tests.support.overlaps import joined
 from tissue import block
 from tissue.contact.geometry.faces import (
     NO_FACE,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.overlaps import NO_GRAVITY, joined
-from tests.test_conservation import momentum
+from tests.support.overlaps import NO_GRAVITY, joined
+from tests.system.energy.test_conservation import momentum
 from tests.tissue.contact.two_blocks import SIZE
 from tissue import Material, TetrahedralMesh, Tissue
 

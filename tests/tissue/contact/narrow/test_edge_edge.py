@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests import strokes
-from tests.test_contact import pressed_blocks
+from tests.support import strokes
+from tests.system.contact.test_contact import pressed_blocks
 from tests.tissue.contact.test_search_stages import cut_block
 from tissue.contact.narrow.edge_edge import (
     crossing_pairs,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.overlaps import joined
+from tests.support.overlaps import joined
 from tissue import TetrahedralMesh, block
 from tissue.contact.geometry.faces import new_faces, with_found_pieces
 from tissue.contact.search.node_motion import NO_PROXIMITY, NOTCH, PROXIMITY, new_node_motion

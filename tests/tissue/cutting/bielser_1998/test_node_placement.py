@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies
+from tests.support import bodies
 from tests.tissue.cutting.bielser_1998.splits import splits_of
 from tissue.cutting.bielser_1998.case_table import TABLE
 from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES, code_of

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from tests import bodies, soundness, strokes
-from tests.materials import SPRINGS
+from tests.support import bodies, soundness, strokes
+from tests.support.materials import SPRINGS
 from tests.tissue.kernels_of import row, springs_of
 from tissue import Material, SolverSettings, Tissue, block
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, naive, soundness
+from tests.support import bodies, naive, soundness
 from tests.tissue.cutting.bielser_1998.splits import splits_of
 from tests.tissue.kernels_of import DENSITY
 from tissue.blade.blade_state import SEARCH
