@@ -5,6 +5,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.vec3 import dot, vec3
+from tissue.elasticity.collapse import add_collapse_forces, clear_collapse_forces
 from tissue.elasticity.internal_forces import deform, internal_force, viscous_force
 from tissue.integrators.attachments import add_attachment_forces, clear_attachment_forces
 from tissue.integrators.geom_reactions import add_geom_reactions
@@ -88,6 +89,7 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
     x, v, external = body.positions, body.velocities, context.stages.external
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
+    add_collapse_forces(context.elastic.collapsing, body, x, external)
     add_geom_reactions(context, x, v, 0.0, 1.0)
     for i in range(body.n_nodes):
         force = point_of(0.0, 0.0, 0.0)
@@ -96,3 +98,4 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
         store_point(out, i, force)
     clear_attachment_forces(context.attachments, external)
     clear_geom_forces(context.geoms, external)
+    clear_collapse_forces(context.elastic.collapsing, body, external)

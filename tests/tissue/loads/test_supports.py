@@ -12,6 +12,7 @@ from tissue import (
     Hierarchical,
     Material,
     SolverSettings,
+    TetrahedralMesh,
     Tissue,
     block,
     fixed_nodes,
@@ -176,3 +177,21 @@ def test_the_hierarchical_relaxation_refuses_to_move_supports():
     tissue = Tissue(MESH, SPRINGS, fixed=fixed_nodes(MESH, "left"), solver=solver)
     with pytest.raises(ValueError, match="'global' or 'verlet'"):
         tissue.move_supports("left", (0.0, 0.0, 0.01))
+
+
+def test_supports_bear_what_keeps_a_flat_tetrahedron_from_turning_over():
+    """The supports give the free node all of the momentum that it gains."""
+    corners = 0.01 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.3, 0.8]])
+    tissue = Tissue(
+        TetrahedralMesh(corners, np.array([[0, 1, 2, 3]])),
+        Material(law="springs", poisson_ratio=0.25, viscous_damping=0.0, retardation_time=0.0),
+        fixed=np.array([True, True, True, False]),
+        positions=corners * [1.0, 1.0, 0.2],
+        gravity=(0.0, 0.0, 0.0),
+    )
+    tissue.step(None, 1e-6)
+    begin, held = tissue.snapshot().velocities[3], tissue.support_forces().sum(axis=0)
+    tissue.step(None, 1e-6)
+    gained = (tissue.snapshot().velocities[3] - begin) / 1e-6
+    mass = tissue._system.body.masses[3]
+    np.testing.assert_allclose(held, mass * gained, rtol=1e-3)
