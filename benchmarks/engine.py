@@ -22,10 +22,10 @@ from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 from tissue.elasticity.energy_density import neo_hookean
-from tissue.integrators.global_stepper import GlobalStepper, method_of
-from tissue.integrators.options import Global
-from tissue.integrators.runge_kutta import accelerations
-from tissue.integrators.step_context import Increment
+from tissue.forces.step_context import Increment
+from tissue.forces.terms import accelerations
+from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.methods import Global, method_of
 from tissue.mesh.body import Body
 
 BlockCells = tuple[int, int, int]

@@ -25,9 +25,9 @@ from .elasticity.spring_calibration import calibrated as calibrated
 from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.rotations import are_rotations as are_rotations
 from .geometry.rotations import checked_rotation as checked_rotation
-from .integrators.options import Global as Global
-from .integrators.options import Hierarchical as Hierarchical
-from .integrators.options import Verlet as Verlet
+from .integrators.methods import Global as Global
+from .integrators.methods import Hierarchical as Hierarchical
+from .integrators.methods import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .loads.attachment import Attachment as Attachment

@@ -72,7 +72,7 @@ class Material:
     viscous_damping: float = 5.0
     """Drag, as the rate at which slow motion within the tissue decays [1/s]. A loose piece falls
     and turns freely: drag acts on its motion less the rigid part, see
-    `tissue.integrators.rigid_motion`."""
+    `tissue.forces.rigid_motion`."""
     retardation_time: float = 5e-5
     """Viscosity per stiffness of dampers along the edges [s] (Kelvin-Voigt). As a continuum:
     viscosity in shear over the shear modulus `mu`, under either law."""

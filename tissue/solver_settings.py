@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from tissue.cut_settings import CutSettings
-from tissue.integrators.options import IntegratorOptions
+from tissue.integrators.methods import IntegratorOptions
 
 MASS_SCALING_FREQUENCY = 5800.0
 """Angular frequency above which nodes get mass [1/s]: up to it three Runge-Kutta steps or four of

@@ -221,7 +221,7 @@ class Tissue:
     ) -> Ligament:
         """Tie points of the tissue by strands to places in the world; return the ligament.
 
-        The edge of the blade cuts the strands that it sweeps across (`tissue.integrators.strands`):
+        The edge of the blade cuts the strands that it sweeps across (`tissue.forces.fibres`):
         cross-section times toughness is in `Energies.breaking`.
 
         Args:

@@ -1,6 +1,5 @@
 """The arrays that kernels work on, made from a mesh as `Tissue` makes them."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -28,13 +27,12 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
-from tissue.integrators.attachments import no_attachments
-from tissue.integrators.damping import Damping
-from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
-from tissue.integrators.stages import Stages, new_stages
-from tissue.integrators.step_context import StepContext
-from tissue.integrators.substeps import damp
-from tissue.integrators.support_state import supports_at_rest
+from tissue.forces.attachments import no_attachments
+from tissue.forces.step_context import Damping, Stages, StepContext, new_stages, supports_at_rest
+from tissue.forces.terms import accelerations
+from tissue.integrators.damping import damp
+from tissue.integrators.driver import take_steps
+from tissue.integrators.runge_kutta import runge_kutta_nystroem
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.loose_pieces import no_loose_pieces
@@ -174,7 +172,7 @@ class Network(NamedTuple):
 
     def damped_between_steps(
         self,
-        take_steps: Callable[..., int],
+        method: int,
         h: float,
         n: int = 1,
         *,
@@ -184,7 +182,7 @@ class Network(NamedTuple):
         """Take `n` steps of `h` [s] with damping between steps; return the damping.
 
         Args:
-            take_steps: A loop of `tissue.integrators.substeps`.
+            method: Number of the method (`tissue.integrators.methods`).
             h: Length of a step [s].
             n: Number of steps.
             interval: Steps from one time that damping acts to the next.
@@ -204,7 +202,7 @@ class Network(NamedTuple):
         )
         undamped = around.replaced(drag=0.0, retardation_time=0.0)
         context = context.replaced(surroundings=undamped, damping=damping)
-        take_steps(context, NOWHERE, n * h, 0.0, 1.0, n)
+        take_steps(context, method, NOWHERE, n * h, 0.0, 1.0, n)
         if not is_running:
             damp(context, 0.0)
         return damping

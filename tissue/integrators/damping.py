@@ -1,4 +1,6 @@
-"""Damping between steps: dampers and drag change velocities between two elastic steps or pairs.
+"""Damping and relaxation of stress, which act between the steps of an integrator.
+
+Dampers and drag change velocities between two elastic steps or pairs.
 
 With D the damping and E the elastic motion the steps are D(s/2) E(s) D(s) E(s) D(s) ..., Strang's
 splitting. E(s) is one step of the integrator or, where damping is slow, two. Each D is one explicit
@@ -11,15 +13,31 @@ evaluation of the dampers would be needed for the second order.
 
 It is stable up to s times the highest rate = 2 (`tissue.integrators.stability`). What it takes from
 the kinetic energy is what the dampers dissipate, so that no integral of a power is needed.
+
+Where damping acts in every stage of a step instead, its power is integrated for an account of
+energy by Simpson's rule, from the motion at the begin, the middle and the end of the step: one
+order below the motion itself.
 """
 
 from tissue.core.jit import kernel
-from tissue.core.simd import point, point_of, store_point, times
-from tissue.core.simd_gather import natural
-from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.core.simd import point, store_point, times
 from tissue.core.vec3 import dot, vec3
-from tissue.elasticity.internal_forces import Elastic, viscous_force
-from tissue.integrators.stages import Stages
+from tissue.elasticity.energy import dissipated_power
+from tissue.elasticity.finite_elements import n_blocks
+from tissue.elasticity.neo_hookean import has_averaged_volumes
+from tissue.elasticity.stored_energy import relaxed_energy
+from tissue.elasticity.viscoelasticity import prepare_relaxation
+from tissue.forces.rigid_motion import add_rigid_part
+from tissue.forces.step_context import Damping, Stages, StepContext
+from tissue.forces.supports import add_support_damping
+from tissue.integrators.node_loops import (
+    DAMPING_CHANGES,
+    DISPLACEMENTS,
+    GRADIENTS,
+    PRESSURES,
+    STRESS_RELAXATION,
+    run_loop,
+)
 from tissue.mesh.body import Body
 
 SLOW_DAMPING = 0.5
@@ -39,61 +57,6 @@ phase each time, would keep the part of its motion that is not velocity: in two 
 fastest mode there may be."""
 
 
-class Damping(Arrays):
-    """Damping that acts between steps, and the loss in damping either way."""
-
-    interval: IntCell
-    """Steps from one time that it acts to the next, at most `LONGEST_INTERVAL`."""
-
-    owed: FloatCell
-    """Time for which it has yet to act [s]: half of the steps since it acted last."""
-    dissipated: FloatCell
-    """Energy lost in viscosity and drag so far [J]; where damping acts in every stage it is counted
-    for an account of energy alone."""
-    is_counted: IntCell
-    """1 where an account of energy is kept, else 0."""
-    rate_uncut: float
-    """Highest rate at which damping stops a motion of the body before it is cut [1/s]."""
-    retardation_time: float
-    """Damping along each edge, per stiffness of the edge [s]; 0 where it acts in every stage."""
-    drag: float
-    """Rate at which free motion dies away [1/s]; 0 where it acts in every stage."""
-
-
-@kernel
-def damping_changes(
-    damping: Damping,
-    body: Body,
-    elastic: Elastic,
-    stages: Stages,
-    seconds: float,
-    begin: int,
-    end: int,
-) -> None:
-    """Find how damping changes the velocities of the nodes from `begin` to `end`.
-
-    Args:
-        damping: How strong it is.
-        body: Masses, positions and velocities.
-        elastic: The dampers.
-        stages: The changes are written.
-        seconds: How long damping acts [s].
-        begin: First node.
-        end: End of the nodes.
-    """
-    time, drag = damping.retardation_time, damping.drag
-    x, v = body.positions, body.velocities
-    for node in range(begin, end):
-        i = natural(node)
-        change = point_of(0.0, 0.0, 0.0)
-        if not body.fixed[i]:
-            change = times(-drag, point(v, i))
-            if time > 0.0:
-                force = viscous_force(elastic, i, x, v, time)
-                change = change + times(1.0 / body.masses[i], force)
-        store_point(stages.change, i, times(seconds, change))
-
-
 @kernel
 def change_velocities(damping: Damping, body: Body, stages: Stages) -> None:
     """Change all velocities as `damping_changes` found, and count what is dissipated."""
@@ -105,3 +68,99 @@ def change_velocities(damping: Damping, body: Body, stages: Stages) -> None:
         after = vec3(v, i)
         dissipated += 0.5 * body.masses[i] * (dot(before, before) - dot(after, after))
     damping.dissipated += dissipated
+
+
+@kernel
+def damp_if_due(context: StepContext, i: int, n: int, h: float) -> None:
+    """Apply the damping between steps, before a step, if it is due.
+
+    Args:
+        context: What takes part.
+        i: The step, from 0 on.
+        n: Number of steps in this part of the time step.
+        h: Length of a step [s].
+    """
+    interval = context.damping.interval
+    if i % interval == 0:
+        damp(context, min(interval, n - i) * h)
+
+
+@kernel
+def damp(context: StepContext, h: float) -> None:
+    """Apply half of the damping of the last steps, and half of that of the steps to come.
+
+    Args:
+        context: What takes part.
+        h: Length of the step to come, or of the two steps [s].
+    """
+    damping = context.damping
+    seconds = damping.owed + 0.5 * h
+    damping.owed = 0.5 * h
+    if damping.retardation_time > 0.0 or damping.drag > 0.0:
+        run_loop(context, DAMPING_CHANGES, seconds)
+        factor, change = seconds * damping.drag, context.stages.change
+        add_rigid_part(context.body, context.loose, context.body.velocities, factor, change)
+        if context.supports.is_moving == 1:
+            add_support_damping(context, seconds)
+        change_velocities(damping, context.body, context.stages)
+
+
+@kernel
+def counts_stage_damping(context: StepContext) -> bool:
+    """Return whether stages are damped, and the loss is to be counted."""
+    around = context.surroundings
+    is_damped = around.retardation_time > 0.0 or around.drag > 0.0
+    return is_damped and context.damping.is_counted == 1
+
+
+@kernel
+def begin_damped_step(context: StepContext) -> float:
+    """Note the motion before a step; return the power that is lost in damping now [W]."""
+    body, stages = context.body, context.stages
+    for i in range(body.n_nodes):
+        store_point(stages.start_positions, i, point(body.positions, i))
+        store_point(stages.start_velocities, i, point(body.velocities, i))
+    return dissipated_power(
+        body,
+        context.elastic,
+        context.surroundings,
+        body.positions,
+        body.velocities,
+        stages.change,
+    )
+
+
+@kernel
+def end_damped_step(context: StepContext, before: float, h: float) -> None:
+    """Count what a step of `h` [s] lost; `before` is the power at its begin [W]."""
+    body, stages = context.body, context.stages
+    elastic, around = context.elastic, context.surroundings
+    after = dissipated_power(body, elastic, around, body.positions, body.velocities, stages.change)
+    # Simpson's rule for the displacement gives the velocity half-way, of 4th order as the rest.
+    middle = stages.start_velocities
+    for i in range(body.n_nodes):
+        way = point(body.positions, i) - point(stages.start_positions, i)
+        ends = point(middle, i) + point(body.velocities, i)
+        store_point(middle, i, times(1.5 / h, way) - times(0.25, ends))
+    half_way = dissipated_power(body, elastic, around, stages.positions, middle, stages.change)
+    context.damping.dissipated += h / 6.0 * (before + 4.0 * half_way + after)
+
+
+@kernel
+def relax_stress(context: StepContext, seconds: float) -> None:
+    """Relax the stress of quasi-linear viscoelasticity for that time [s], which may be infinite.
+
+    What Maxwell elements dissipate is counted with the damping where an account is kept.
+    """
+    solid = context.elastic.solid
+    is_counted = context.damping.is_counted == 1
+    blocks = n_blocks(solid, context.body.n_tetrahedra)
+    prepare_relaxation(solid, seconds)
+    run_loop(context, DISPLACEMENTS, 0.0)
+    run_loop(context, GRADIENTS, 0.0)
+    if has_averaged_volumes(solid):
+        run_loop(context, PRESSURES, 0.0)
+    before = relaxed_energy(solid, blocks) if is_counted else 0.0
+    run_loop(context, STRESS_RELAXATION, 0.0)
+    if is_counted:
+        context.damping.dissipated += before - relaxed_energy(solid, blocks)

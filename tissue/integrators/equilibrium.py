@@ -13,13 +13,13 @@ import numpy as np
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.strained_frequency import StepLimit
+from tissue.forces.step_context import Increment
+from tissue.forces.terms import accelerations
 from tissue.integrators.equilibrium_checks import SupportConditions, fastest_node, gone_too_far
 from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.integrator import UnstableError, not_finite
 from tissue.integrators.model import TissueModel
-from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
-from tissue.integrators.step_context import Increment
-from tissue.integrators.unstable import UnstableError, not_finite
 from tissue.types import TissueError
 
 SETTLED = 1e-4 * 9.81
@@ -159,7 +159,7 @@ def _take_steps(stepper: GlobalStepper, system: TissueModel, edge: Edge, rate: f
     strained = elasticity.strained_frequency_squared(system.body, system.visits, limit)
     added = contact.added_frequency_squared + system.added_by_attachments
     highest = max(at_rest, strained) + added
-    step = stable_step(stepper.method.limit, elasticity.arrays, highest, system.surroundings)
+    step = stable_step(stepper.method.number, elasticity.arrays, highest, system.surroundings)
     dt = STEPS_BETWEEN_LOOKS * step
     contact.begin()
     system.find_contacts(dt)

@@ -1,71 +1,41 @@
-"""Integrators of all nodes together, in as many equal steps as stability needs."""
+"""All nodes together, in as many equal steps as stability needs; and which integrator is chosen."""
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
 
 from tissue.blade.blade_context import BladeContext
 from tissue.core.jit import SameTypes
-from tissue.integrators.model import TissueModel
-from tissue.integrators.options import Global, IntegratorOptions, Verlet
-from tissue.integrators.relaxation import (
+from tissue.core.limits import MANY_SUBSTEPS, MOST_SUBSTEPS
+from tissue.cut_settings import undamped_steps
+from tissue.forces.step_context import Increment
+from tissue.integrators.driver import (
     FIND_FACES,
     NOT_FINITE,
     RELAXED,
     UNSTABLE,
     Relaxation,
-    relax_by_nystroem,
-    relax_by_runge_kutta,
-    relax_by_verlet,
+    relax,
+    take_steps,
 )
-from tissue.integrators.rest import TIME_TO_REST
-from tissue.integrators.stability import NYSTROEM, STAGE_DAMPED, VERLET
-from tissue.integrators.step_choice import (
+from tissue.integrators.integrator import Integrator, UnstableError, not_finite
+from tissue.integrators.methods import Hierarchical, IntegratorOptions, Method
+from tissue.integrators.model import TissueModel
+from tissue.integrators.resting import TIME_TO_REST
+from tissue.integrators.stability import stable_step
+from tissue.integrators.step_size import (
     StepChoice,
-    begin_increment,
     new_step_choice,
-    next_part,
     room_for_contact,
 )
-from tissue.integrators.step_context import Increment
-from tissue.integrators.substeps import (
-    nystroem_steps,
-    runge_kutta_steps,
-    verlet_steps,
-)
-from tissue.integrators.threaded import Threads
-from tissue.integrators.unstable import UnstableError, not_finite
-from tissue.material import Law
+from tissue.integrators.threads import Threads
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
 
 _ROOM = SameTypes(room_for_contact)
 
-
-class Method(NamedTuple):
-    """A method that advances all nodes together."""
-
-    take_steps: Callable[..., None]
-    """Takes a number of steps, as `tissue.integrators.substeps.runge_kutta_steps`."""
-    relax: Callable[..., int]
-    """A whole increment: `tissue.integrators.relaxation.relax_by_runge_kutta`."""
-    limit: int
-    """What limits its steps: a constant of `tissue.integrators.stability`."""
-    damps_between_steps: bool
-    """Whether damping acts between steps; if not, in every stage of them."""
-
-
-def method_of(options: IntegratorOptions, law: Law) -> Method:
-    """Return the method of a choice; for integrators that do not move all nodes, Runge-Kutta.
-
-    These move all nodes where a body settles.
-    """
-    if isinstance(options, Verlet):
-        return Method(verlet_steps, relax_by_verlet, VERLET, True)
-    usual = "stage" if law == "springs" else "step"
-    if isinstance(options, Global) and (options.damping or usual) == "step":
-        return Method(nystroem_steps, relax_by_nystroem, NYSTROEM, True)
-    return Method(runge_kutta_steps, relax_by_runge_kutta, STAGE_DAMPED, False)
+_SURELY_FEW = 0.1
+"""Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
+longest step need not be computed. It takes some 1.3 steps at most for each of them, by
+`tissue.integrators.stability.STABILITY_LIMIT`."""
 
 
 class GlobalStepper:
@@ -82,7 +52,7 @@ class GlobalStepper:
 
     def __init__(self, method: Method, threads: int = 1) -> None:
         self.method = method
-        self._relax = SameTypes(method.relax)
+        self._relax = SameTypes(relax)
         self._threads = Threads(threads) if threads > 1 else None
         self._choice: StepChoice | None = None
         self._relaxation: Relaxation | None = None
@@ -119,7 +89,10 @@ class GlobalStepper:
             if outcome == RELAXED:
                 break
             if outcome == UNSTABLE:
-                expect_stable(choice)
+                raise UnstableError(
+                    f"it would take {choice.asked:.2g} steps of the integrator to go on, where "
+                    f"tissue at rest takes {math.ceil(choice.at_rest)}"
+                )
             if outcome == NOT_FINITE:
                 raise not_finite()
             blade, stage = system.with_blade_room(outcome, blade), arrays.stage
@@ -128,22 +101,11 @@ class GlobalStepper:
             system.find_new_loose_pieces()
         return n
 
-    def advance(self, system: TissueModel, increment: Increment) -> int:
-        """Advance the motion by an increment; return the steps taken."""
-        choice = self._find_contacts(system, increment, self._choice_for(system))
-        context = system.context
-        begin_increment(choice, context, *increment[1:])
-        while next_part(choice, context):
-            part = increment._replace(begin=choice.begin, end=choice.part_end)
-            self.take_steps(system, part, choice.n_steps)
-        expect_stable(choice)
-        return choice.done
-
     def take_steps(self, system: TissueModel, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
         if self._threads is not None:
             self._threads.join(system.context)
-        self.method.take_steps(system.context, *increment, n)
+        take_steps(system.context, self.method.number, *increment, n)
 
     def _find_contacts(
         self, system: TissueModel, increment: Increment, choice: StepChoice
@@ -158,7 +120,7 @@ class GlobalStepper:
         choice, n_nodes = self._choice, len(system.body.masses)
         if choice is None or len(choice.no_frequency) != n_nodes:
             where = (system.node_size, system.surroundings, n_nodes)
-            self._choice = choice = new_step_choice(self.method.limit, *where)
+            self._choice = choice = new_step_choice(self.method.number, *where)
             choice.refinement = self._refinement
         choice.of_contact = system.contact.added_frequency_squared + system.added_by_attachments
         return choice
@@ -211,14 +173,46 @@ class GlobalStepper:
         """Do nothing: there are no arrays."""
 
 
-def expect_stable(choice: StepChoice) -> None:
-    """Refuse motion that became unstable.
+def expect_few_steps(system: TissueModel, method: int, dt: float) -> None:
+    """Refuse a time step that takes more than `MOST_SUBSTEPS` steps of the integrator.
+
+    Args:
+        system: The body before the step, which is not changed.
+        method: Number of the method (`tissue.integrators.methods`).
+        dt: Length of the step [s].
 
     Raises:
-        UnstableError: it takes too many steps: see `step_choice.MOST_STEPS`.
+        ValueError: it does; the message says why, and how long a step may be.
     """
-    if choice.is_unstable:
-        raise UnstableError(
-            f"it would take {choice.asked:.2g} steps of the integrator to go on, where tissue at "
-            f"rest takes {math.ceil(choice.at_rest)}"
-        )
+    elastic, surroundings = system.elasticity.arrays, system.surroundings
+    of_body = system.elasticity.frequency_squared
+    of_holds = system.added_by_attachments
+    squared = of_body + of_holds + system.contact.added_frequency_squared
+    rate = surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag
+    if dt * (math.sqrt(squared) + rate) <= _SURELY_FEW * MOST_SUBSTEPS:
+        return
+    step = stable_step(method, elastic, squared, surroundings)
+    if dt <= MOST_SUBSTEPS * step:
+        return
+    reason = "its elements are small, stiff or light"
+    if undamped_steps(math.sqrt(squared), dt) <= MANY_SUBSTEPS:
+        reason = "damping in it is strong"
+    elif of_holds > of_body:
+        reason = "what is attached to it is held stiffly, or damped strongly"
+    raise ValueError(
+        f"a time step of {dt:.3g} s takes some {dt / step:.3g} steps of the integrator in this "
+        f"tissue, because {reason}; at most {MOST_SUBSTEPS:,} are done. Take time steps of at most "
+        f"{MOST_SUBSTEPS * step:.2g} s"
+    )
+
+
+def integrator_of(
+    options: IntegratorOptions, global_stepper: GlobalStepper, n_nodes: int
+) -> Integrator:
+    """Return the integrator that a user chose, with room for that many nodes."""
+    # Imported late: kernels that are not used cost no start.
+    if isinstance(options, Hierarchical):
+        from tissue.integrators.bielser_1998.stepper import HierarchicalStepper
+
+        return HierarchicalStepper(options, n_nodes)
+    return global_stepper

@@ -1,16 +1,18 @@
-"""What an integrator does for a tissue, which one a choice stands for, and the end of a step."""
+"""What an integrator does for a tissue, and the error where the motion becomes unstable."""
 
 from typing import Protocol
 
 from tissue.blade.blade_context import BladeContext
 from tissue.core.array_types import IntArray
-from tissue.integrators.global_stepper import GlobalStepper
+from tissue.forces.step_context import Increment
 from tissue.integrators.model import TissueModel
-from tissue.integrators.options import Hierarchical, IntegratorOptions
-from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.moved_nodes import Moved
+from tissue.types import TissueError
+
+REMEDY = "A shorter time step, or a material that is softer or heavier, may help"
+"""Cases to try."""
 
 
 class Integrator(Protocol):
@@ -23,7 +25,7 @@ class Integrator(Protocol):
 
     @property
     def moving(self) -> tuple[IntArray, int] | None:
-        """Nodes that may have moved in the last `advance`, and how many; None where all may."""
+        """Nodes that may have moved in the last `relax`, and how many; None where all may."""
         ...
 
     def relax(
@@ -44,16 +46,12 @@ class Integrator(Protocol):
         """
         ...
 
-    def advance(self, system: TissueModel, increment: Increment) -> int:
-        """Advance the motion by an increment; return how many steps the finest nodes took."""
-        ...
-
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Note that a pass of a cut changed the mesh."""
         ...
 
     def body_moved(self, body: Body) -> None:
-        """Take note that every node moved by other means, and is at rest."""
+        """Note that every node moved by other means, and is at rest."""
         ...
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
@@ -61,13 +59,18 @@ class Integrator(Protocol):
         ...
 
 
-def integrator_of(
-    options: IntegratorOptions, global_stepper: GlobalStepper, n_nodes: int
-) -> Integrator:
-    """Return the integrator that a user chose, with room for that many nodes."""
-    # Imported late: kernels that are not used cost no start.
-    if isinstance(options, Hierarchical):
-        from tissue.integrators.hierarchical.stepper import HierarchicalStepper
+class UnstableError(TissueError):
+    """The motion of the tissue became unstable.
 
-        return HierarchicalStepper(options, n_nodes)
-    return global_stepper
+    Args:
+        fault: How that shows.
+    """
+
+    def __init__(self, fault: str) -> None:
+        self.fault = fault
+        super().__init__(f"the motion of the tissue became unstable: {fault}. {REMEDY}")
+
+
+def not_finite() -> UnstableError:
+    """Return the error that tells that a position is not a finite number."""
+    return UnstableError("the position of a node is not a finite number")

@@ -22,13 +22,10 @@ from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
-from tissue.integrators.attachments import Attachments, no_attachments, strand_boxes
-from tissue.integrators.damping import Damping
+from tissue.forces.attachments import Attachments, no_attachments, strand_boxes
+from tissue.forces.fibres import report_strands
+from tissue.forces.step_context import Damping, StepContext, new_stages, supports_at_rest
 from tissue.integrators.stability import damping_rate, stable_step
-from tissue.integrators.stages import new_stages
-from tissue.integrators.step_context import StepContext
-from tissue.integrators.strands import report_strands
-from tissue.integrators.support_state import supports_at_rest
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
@@ -199,7 +196,7 @@ class TissueModel:
         """Relax the stress of the tissue where it is, for that time [s] or for ever (inf)."""
         if self.elasticity.relaxes:
             # Imported late: kernels that are not used cost no start.
-            from tissue.integrators.stress_relaxation import relax_stress
+            from tissue.integrators.damping import relax_stress
 
             relax_stress(self.context, seconds)
 

@@ -1,66 +1,158 @@
-"""Loops over the nodes of a body: stages of Runge-Kutta steps, drift and kick of Verlet.
+"""The loops over a body that steps consist of, which threads share: of every method, and damping.
 
-Each writes rows of nodes from `begin` to `end` alone, so that threads may share it.
+Each loop writes one row for each of its items from `begin` to `end`, from what loops before it
+wrote; sums are gathered. So the result does not depend on who runs which part of it
+(`tissue.core.thread_team`).
 """
 
-from tissue.core.array_types import FloatArray
+from tissue.core.atomics import pause
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.simd_blocks import store_row
 from tissue.core.simd_gather import natural
-from tissue.elasticity.internal_forces import internal_force, viscous_force
-from tissue.elasticity.mass_scaling import free_fall
-from tissue.elasticity.neo_hookean import solid_force
-from tissue.integrators.stages import Stages
-from tissue.integrators.step_context import StepContext
+from tissue.core.thread_team import (
+    claim_first,
+    claim_last,
+    end_chunk,
+    items_of,
+    open_loop,
+    wait_for_others,
+)
+from tissue.elasticity.finite_elements import n_blocks
+from tissue.elasticity.internal_forces import viscous_force
+from tissue.elasticity.neo_hookean import (
+    corner_forces,
+    displacement_gradients,
+    displacements,
+    pressures_in_order,
+)
+from tissue.elasticity.viscoelasticity import relax_blocks
+from tissue.forces.acceleration import acceleration, acceleration_of, is_solid
+from tissue.forces.step_context import Stages, StepContext
 from tissue.mesh.body import Body
+
+GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
+"""Loops over blocks of tetrahedra."""
+DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, PRESSURES = 3, 4, 5, 6
+"""Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
+DISPLACED = -1
+"""Stands for a loop of displacements where the loop before has written them."""
+DEFORMED = -2
+"""Stands for it where gradients are known, too (`Solid.are_gradients_known`)."""
+FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 7, 8, 9, 10
+"""Loops over nodes of the Runge-Kutta method on two levels."""
+NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 11, 12, 13
+"""Loops over nodes of the method of three stages."""
+DRIFTING, KICKING = 14, 15
+"""Loops over nodes of position Verlet."""
+DAMPING_CHANGES = 16
+"""The loop over nodes of damping between steps."""
+
+BLOCKS_OF_A_CHUNK = 32
+"""Blocks of tetrahedra in a chunk: about 1 us. Fewer: claims, some 0.1 us, take more of the time;
+more: the first thread waits longer for the last chunk."""
+
+NODES_OF_A_CHUNK = 64
+"""Nodes in a chunk: 0.2 to 1.5 us; see `BLOCKS_OF_A_CHUNK`."""
 
 
 @kernel
-def is_solid(context: StepContext) -> bool:
-    """Return whether tetrahedra alone act inside the body in the stages of a step.
-
-    The loops over nodes are then compiled without what springs and dampers take, and write
-    displacements beside positions.
-    """
-    elastic, time = context.elastic, context.surroundings.retardation_time
-    return elastic.has_tetrahedra == 1 and elastic.has_springs == 0 and time == 0.0
-
-
-@inlined
-def acceleration(
-    context: StepContext, node: int, positions: FloatArray, velocities: FloatArray
-) -> Point:
-    """Acceleration of a node at `positions` [m] and `velocities` [m/s]; of a fixed one zero."""
-    return _acceleration(context, node, positions, velocities, False)
-
-
-@inlined
-def _acceleration(
-    context: StepContext, node: int, positions: FloatArray, velocities: FloatArray, solid: bool
-) -> Point:
-    """Return `acceleration`.
+def run_loop(context: StepContext, loop: int, seconds: float) -> None:
+    """Run a loop over the whole body, with the other threads that take part.
 
     Args:
         context: What takes part.
-        node: The node.
-        positions: Positions of the nodes [m].
-        velocities: Their velocities [m/s].
-        solid: What `is_solid` returns; a constant where this is called.
+        loop: Which loop.
+        seconds: The step that it is for [s]; some loops need none.
     """
-    body, surroundings, node = context.body, context.surroundings, natural(node)
-    if body.fixed[node]:
-        return point_of(0.0, 0.0, 0.0)
-    if solid:
-        force = solid_force(context.elastic.solid, node)
+    is_of_blocks = loop <= STRESS_RELAXATION
+    body, team = context.body, context.team
+    n = n_blocks(context.elastic.solid, body.n_tetrahedra) if is_of_blocks else body.n_nodes
+    if team.is_shared == 0:
+        _run_part(context, loop, seconds, 0, n)
+        return
+    size = BLOCKS_OF_A_CHUNK if is_of_blocks else NODES_OF_A_CHUNK
+    of_others = open_loop(team, loop, seconds, n, size)
+    chunk = claim_first(team)
+    while chunk >= 0:
+        begin, end = items_of(team, chunk)
+        _run_part(context, loop, seconds, begin, end)
+        of_others -= 1
+        chunk = claim_first(team)
+    wait_for_others(team, of_others)
+
+
+@kernel
+def take_part(context: StepContext, longest_spin: int) -> int:
+    """Run chunks of loops that another thread opens; return how many.
+
+    It returns where no loop has been opened for a while.
+
+    Args:
+        context: What takes part, the same struct as the other thread's.
+        longest_spin: Times to look for a chunk in vain before it returns.
+    """
+    team, spins, n_chunks = context.team, 0, 0
+    while spins < longest_spin:
+        chunk = claim_last(team)
+        if chunk >= 0:
+            begin, end = items_of(team, chunk)
+            _run_part(context, team.loop, team.seconds, begin, end)
+            end_chunk(team)
+            n_chunks += 1
+            spins = 0
+        else:
+            pause()
+            spins += 1
+    return n_chunks
+
+
+@kernel
+def _run_part(context: StepContext, loop: int, seconds: float, begin: int, end: int) -> None:
+    """Run a loop over its items from `begin` to `end`; see `run_loop`."""
+    if loop < FIRST_STAGE:
+        _deform_part(context, loop, begin, end)
+    elif loop == FIRST_STAGE:
+        first_stage(context, seconds, begin, end)
+    elif loop == SECOND_STAGE:
+        second_stage(context, seconds, begin, end)
+    elif loop == THIRD_STAGE:
+        third_stage(context, seconds, begin, end)
+    elif loop == FOURTH_STAGE:
+        fourth_stage(context, seconds, begin, end)
+    elif loop == NYSTROEM_FIRST:
+        nystroem_first(context, seconds, begin, end)
+    elif loop == NYSTROEM_SECOND:
+        nystroem_second(context, seconds, begin, end)
+    elif loop == NYSTROEM_THIRD:
+        nystroem_third(context, seconds, begin, end)
+    elif loop == DRIFTING:
+        drift(context, seconds, begin, end)
+    elif loop == KICKING:
+        kick(context, seconds, begin, end)
     else:
-        time = surroundings.retardation_time
-        force = internal_force(context.elastic, node, positions, velocities, time)
-    force = force + point(context.stages.external, node) + point(context.stages.loads, node)
-    fall = free_fall(body, node, surroundings.gravity)
-    free = fall - times(surroundings.drag, point(velocities, node))
-    total: Point = free + times(1.0 / body.masses[node], force)
-    return total
+        damping_changes(context, seconds, begin, end)
+
+
+@kernel
+def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
+    """Run a part of a loop of `deform_shared`, or of relaxation."""
+    solid, body, stages = context.elastic.solid, context.body, context.stages
+    if loop == GRADIENTS:
+        displacement_gradients(solid, solid.every, begin, end)
+    elif loop == CORNER_FORCES:
+        corner_forces(solid, solid.every, begin, end)
+    elif loop == STRESS_RELAXATION:
+        relax_blocks(solid, begin, end)
+    elif loop == PRESSURES:
+        pressures_in_order(solid, begin, end)
+    else:
+        positions = body.positions
+        if loop == DISPLACEMENTS_2:
+            positions = stages.positions
+        elif loop == DISPLACEMENTS_LAST:
+            positions = stages.last_positions
+        displacements(solid, body, positions, solid.every, begin, end)
 
 
 @inlined
@@ -154,7 +246,7 @@ def nystroem_first(context: StepContext, h: float, begin: int, end: int) -> None
 def _nystroem_first(context: StepContext, h: float, i: int, solid: bool) -> None:
     body, stages = context.body, context.stages
     x, v = body.positions, body.velocities
-    a1, now = _acceleration(context, i, x, v, solid), point(v, i)
+    a1, now = acceleration_of(context, i, x, v, solid), point(v, i)
     store_point(stages.a1, i, a1)
     x2 = point(x, i) + times(h / 3.0, now) + times(h * h / 18.0, a1)
     store_point(stages.positions, i, x2)
@@ -177,7 +269,7 @@ def nystroem_second(context: StepContext, h: float, begin: int, end: int) -> Non
 @inlined
 def _nystroem_second(context: StepContext, h: float, i: int, solid: bool) -> None:
     body, stages = context.body, context.stages
-    a2 = _acceleration(context, i, stages.positions, stages.velocities, solid)
+    a2 = acceleration_of(context, i, stages.positions, stages.velocities, solid)
     x, v, a1 = point(body.positions, i), point(body.velocities, i), point(stages.a1, i)
     store_point(stages.a2, i, a2)
     bend = times(5.0 / 144.0 * h * h, a1) + times(5.0 / 16.0 * h * h, a2)
@@ -203,7 +295,7 @@ def nystroem_third(context: StepContext, h: float, begin: int, end: int) -> None
 @inlined
 def _nystroem_third(context: StepContext, h: float, i: int, solid: bool) -> None:
     body, stages = context.body, context.stages
-    a3 = _acceleration(context, i, stages.last_positions, stages.velocities, solid)
+    a3 = acceleration_of(context, i, stages.last_positions, stages.velocities, solid)
     x, v = point(body.positions, i), point(body.velocities, i)
     a1, a2 = point(stages.a1, i), point(stages.a2, i)
     bend = times(0.1, a1) + times(1.0 / 3.0, a2) + times(1.0 / 15.0, a3)
@@ -236,9 +328,26 @@ def kick(context: StepContext, h: float, begin: int, end: int) -> None:
     x, v = context.body.positions, context.body.velocities
     if is_solid(context):
         for i in range(begin, end):
-            now = point(v, i) + times(h, _acceleration(context, i, x, v, True))
+            now = point(v, i) + times(h, acceleration_of(context, i, x, v, True))
             store_point(v, i, now)
             store_point(x, i, point(x, i) + times(0.5 * h, now))
     else:
         for i in range(begin, end):
-            store_point(v, i, point(v, i) + times(h, _acceleration(context, i, x, v, False)))
+            store_point(v, i, point(v, i) + times(h, acceleration_of(context, i, x, v, False)))
+
+
+@kernel
+def damping_changes(context: StepContext, seconds: float, begin: int, end: int) -> None:
+    """Find how damping over some time [s] changes the velocities of the nodes `begin` to `end`."""
+    damping, body, stages = context.damping, context.body, context.stages
+    time, drag = damping.retardation_time, damping.drag
+    x, v = body.positions, body.velocities
+    for node in range(begin, end):
+        i = natural(node)
+        change = point_of(0.0, 0.0, 0.0)
+        if not body.fixed[i]:
+            change = times(-drag, point(v, i))
+            if time > 0.0:
+                force = viscous_force(context.elastic, i, x, v, time)
+                change = change + times(1.0 / body.masses[i], force)
+        store_point(stages.change, i, times(seconds, change))

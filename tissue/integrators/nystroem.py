@@ -10,8 +10,7 @@ The methods of 4th order with three stages, the first at t, are a family with on
 instant c of the second stage: the third is at (3 - 4 c) / (4 - 6 c), for the weights must integrate
 polynomials of third degree, and the other coefficients follow (Hairer, Norsett and Wanner, Solving
 Ordinary Differential Equations I, II.14). For x'' = -w^2 x and z = w h the energy of a mode falls
-by
-the factor 1 - d z^6 in a step. Nystroem's own method has c = 1/2, d = 1/288 and is stable up to
+by the factor 1 - d z^6 in a step. Nystroem's own method has c = 1/2, d = 1/288 and is stable up to
 z = 2.59; at c = 1/3 both are best: d = 1/864, and z up to sqrt(12) = 3.46.
 
 Contact and friction depend on velocities, too. For them the stages have the velocities
@@ -24,11 +23,11 @@ a Runge-Kutta method of third order.
 from typing import Final
 
 from tissue.blade.edge import Edge
-from tissue.core.jit import kernel
-from tissue.integrators.geom_reactions import add_geom_reactions
-from tissue.integrators.node_loops import is_solid
-from tissue.integrators.runge_kutta import apply_outer_forces
-from tissue.integrators.shared_loops import (
+from tissue.core.jit import inlined, kernel
+from tissue.forces.acceleration import is_solid
+from tissue.forces.step_context import Instant, StepContext
+from tissue.integrators.evaluation import evaluate_forces
+from tissue.integrators.node_loops import (
     DEFORMED,
     DISPLACED,
     DISPLACEMENTS,
@@ -37,11 +36,8 @@ from tissue.integrators.shared_loops import (
     NYSTROEM_FIRST,
     NYSTROEM_SECOND,
     NYSTROEM_THIRD,
-    deform_shared,
     run_loop,
 )
-from tissue.integrators.step_context import StepContext
-from tissue.integrators.supports import add_support_work
 
 INSTANTS: Final = (0.0, 1.0 / 3.0, 5.0 / 6.0)
 """Instants of the stages, as fractions of the step."""
@@ -51,10 +47,8 @@ WEIGHTS: Final = (1.0 / 10.0, 1.0 / 2.0, 2.0 / 5.0)
 
 
 @kernel
-def three_stage_nystroem(
-    context: StepContext, edge: Edge, dt: float, at: float, share: float
-) -> None:
-    """Take one step, without damping, contact impulses or slip.
+def nystroem_step(context: StepContext, edge: Edge, dt: float, at: float, share: float) -> None:
+    """Take one step, without damping, the end of contact or slip.
 
     Args:
         context: What takes part.
@@ -63,28 +57,25 @@ def three_stage_nystroem(
         at: Fraction of the time step at which the step begins.
         share: Length of the step as a fraction of the time step.
     """
-    body, stages, h = context.body, context.stages, share * dt
-    is_moving, is_displaced = context.supports.is_moving == 1, is_solid(context)
-    x1, v1, w1 = body.positions, body.velocities, WEIGHTS[0]
-    apply_outer_forces(context, edge, x1, v1, at + INSTANTS[0] * share, share * w1, dt)
-    solid = context.elastic.solid
-    deform_shared(context, DEFORMED if solid.are_gradients_known == 1 else DISPLACEMENTS)
+    body, stages, solid, h = context.body, context.stages, context.elastic.solid, share * dt
+    is_displaced = is_solid(context)
+    x1, v1 = body.positions, body.velocities
+    loop = DEFORMED if solid.are_gradients_known == 1 else DISPLACEMENTS
+    evaluate_forces(context, edge, x1, v1, loop, _instant(0, at, share, dt))
     solid.are_gradients_known = 0
-    add_geom_reactions(context, x1, v1, share * w1, dt)
-    if is_moving:
-        add_support_work(context, x1, v1, h * w1)
     run_loop(context, NYSTROEM_FIRST, h)
-    x2, v2, w2 = stages.positions, stages.velocities, WEIGHTS[1]
-    apply_outer_forces(context, edge, x2, v2, at + INSTANTS[1] * share, share * w2, dt)
-    deform_shared(context, DISPLACED if is_displaced else DISPLACEMENTS_2)
-    add_geom_reactions(context, x2, v2, share * w2, dt)
-    if is_moving:
-        add_support_work(context, x2, v2, h * w2)
+    x2, v2 = stages.positions, stages.velocities
+    loop = DISPLACED if is_displaced else DISPLACEMENTS_2
+    evaluate_forces(context, edge, x2, v2, loop, _instant(1, at, share, dt))
     run_loop(context, NYSTROEM_SECOND, h)
-    x3, v3, w3 = stages.last_positions, stages.velocities, WEIGHTS[2]
-    apply_outer_forces(context, edge, x3, v3, at + INSTANTS[2] * share, share * w3, dt)
-    deform_shared(context, DISPLACED if is_displaced else DISPLACEMENTS_LAST)
-    add_geom_reactions(context, x3, v3, share * w3, dt)
-    if is_moving:
-        add_support_work(context, x3, v3, h * w3)
+    x3, v3 = stages.last_positions, stages.velocities
+    loop = DISPLACED if is_displaced else DISPLACEMENTS_LAST
+    evaluate_forces(context, edge, x3, v3, loop, _instant(2, at, share, dt))
     run_loop(context, NYSTROEM_THIRD, h)
+
+
+@inlined
+def _instant(stage: int, at: float, share: float, dt: float) -> Instant:
+    """Return the instant of a stage of a step, from `at` on, and its weight."""
+    weight = WEIGHTS[stage]
+    return Instant(at + INSTANTS[stage] * share, share * weight, share * dt * weight, dt)

@@ -1,4 +1,4 @@
-"""The largest stable steps of the methods that move all nodes together."""
+"""The largest steps at which each method is stable."""
 
 import math
 from typing import Final
@@ -8,13 +8,11 @@ import numpy as np
 from tissue.core.jit import kernel
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.stiffening import stiffens
+from tissue.integrators.methods import METHODS, RUNGE_KUTTA, SAFETY
 
-STAGE_DAMPED: Final = 0
-"""The Runge-Kutta method, with damping in every stage."""
-NYSTROEM: Final = 1
-"""The Nystroem method of three stages."""
-VERLET: Final = 2
-"""Position Verlet."""
+_LIMITS: Final = tuple(method.limit for method in METHODS.values())
+_SAFETY: Final = tuple(method.safety for method in METHODS.values())
+_SAFETY_STIFFENING: Final = tuple(method.safety_stiffening for method in METHODS.values())
 
 STABILITY_LIMIT = np.array(
     [
@@ -34,12 +32,6 @@ STABILITY_LIMIT = np.array(
 stage (the tests measure it). Between 0.05 and 0.5 the limit is higher; the table stays at its
 lowest."""
 
-NYSTROEM_LIMIT = 3.464
-"""Largest angular frequency times step of the Nystroem method of three stages: sqrt(12)."""
-
-VERLET_LIMIT = 2.0
-"""Largest angular frequency times step of position Verlet."""
-
 DAMPING_LIMIT = 2.0
 """Largest rate of damping times its interval where damping acts between steps, with either method:
 beyond it the damping turns a velocity round and makes it larger."""
@@ -49,20 +41,6 @@ _LAST_LIMIT: Final = float(STABILITY_LIMIT[-1, 1])
 _INVERSES: Final = tuple((1.0 / STABILITY_LIMIT[:, 1]).tolist())
 """The limit falls nearly as 1 / ratio: a line between its entries would be above it."""
 
-SAFETY = 0.8
-"""Share of the stable step that is used. Springs in strong compression are stiffer than at rest;
-0.8 covers a compression to about 0.7 of the rest length. Above 1 the body can explode."""
-
-NYSTROEM_SAFETY = 0.84
-"""The same for the Nystroem method of three stages, which takes energy from fast modes. No account
-of the energy sees that: in the organ's stroke it is 0.3 % of the work, with two steps in a
-millisecond; at 0.67, with three, it was 0.1 %."""
-
-NYSTROEM_SAFETY_STIFFENING = 0.75
-"""The same under laws that stiffen, whose frequencies can double from one bound to the next. The
-account needs no less than `NYSTROEM_SAFETY`: cuts in blocks of liver, fat and skin as published
-left 0.16, 0.01 and 0.08 % of the work at 0.84, and 0.15, 0.01 and 0.12 % at 0.75."""
-
 
 @kernel
 def stable_step(
@@ -70,20 +48,42 @@ def stable_step(
 ) -> float:
     """Return a stable step [s] of a method; infinite where every node is fixed.
 
+    Where damping acts between steps, the elastic motion and the damping limit it each by itself.
+
     Args:
-        method: One of the constants above.
+        method: Number of the method (`tissue.integrators.methods`).
         elastic: Its dampers, and whether its law stiffens.
         frequency_squared: Bound on w^2 [1/s2].
         surroundings: Gravity and all damping.
     """
-    step: float
-    if method == STAGE_DAMPED:
-        step = stage_damped_step(elastic, frequency_squared, surroundings)
-    elif method == NYSTROEM:
-        step = nystroem_step(elastic, frequency_squared, surroundings)
-    else:
-        step = verlet_step(elastic, frequency_squared, surroundings)
-    return step
+    if method == RUNGE_KUTTA:
+        damped: float = _stage_damped_step(elastic, frequency_squared, surroundings)
+        return damped
+    if frequency_squared == 0.0:
+        return math.inf  # every node is fixed
+    rate = damping_rate(elastic, surroundings)
+    step = SAFETY / max(math.sqrt(frequency_squared) / _LIMITS[method], rate / DAMPING_LIMIT)
+    safety = _SAFETY_STIFFENING if stiffens(elastic.solid.law) else _SAFETY
+    return safety[method] / SAFETY * step
+
+
+@kernel
+def _stage_damped_step(
+    elastic: Elastic, frequency_squared: float, surroundings: Surroundings
+) -> float:
+    """Return a stable Runge-Kutta step [s] where damping acts in every stage.
+
+    Dampers along edges brake a mode by retardation_time times their own w^2, and not by that of
+    tetrahedra, which is several times as high where tissue hardly changes its volume. What is
+    braked as much at a lower frequency is stable too, within `SAFETY`: over the damping ratios
+    from 0.5 on, braking times the largest step is 2.6 to 2.8 (`STABILITY_LIMIT`).
+    """
+    retardation_time = surroundings.retardation_time
+    if frequency_squared > elastic.highest_of_dampers:
+        retardation_time *= elastic.highest_of_dampers / frequency_squared
+    frequency = math.sqrt(frequency_squared)
+    largest: float = largest_stable_step(frequency, retardation_time, surroundings.drag)
+    return SAFETY * largest
 
 
 @kernel
@@ -107,51 +107,6 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
     inverse = _INVERSES[i] + share * (_INVERSES[i + 1] - _INVERSES[i])
     limit = 1.0 / inverse
     return limit / frequency
-
-
-@kernel
-def stage_damped_step(
-    elastic: Elastic, frequency_squared: float, surroundings: Surroundings
-) -> float:
-    """Return a stable Runge-Kutta step [s] where damping acts in every stage.
-
-    Dampers along edges brake a mode by retardation_time times their own w^2, and not by that of
-    tetrahedra, which is several times as high where tissue hardly changes its volume. What is
-    braked as much at a lower frequency is stable too, within `SAFETY`: over the damping ratios
-    from 0.5 on, braking times the largest step is 2.6 to 2.8 (`STABILITY_LIMIT`).
-    """
-    retardation_time = surroundings.retardation_time
-    if frequency_squared > elastic.highest_of_dampers:
-        retardation_time *= elastic.highest_of_dampers / frequency_squared
-    frequency = math.sqrt(frequency_squared)
-    largest: float = largest_stable_step(frequency, retardation_time, surroundings.drag)
-    return SAFETY * largest
-
-
-@kernel
-def nystroem_step(elastic: Elastic, frequency_squared: float, surroundings: Surroundings) -> float:
-    """Return a stable step of the Nystroem method of three stages [s]."""
-    safety = NYSTROEM_SAFETY_STIFFENING if stiffens(elastic.solid.law) else NYSTROEM_SAFETY
-    step: float = _step(NYSTROEM_LIMIT, elastic, frequency_squared, surroundings)
-    return safety / SAFETY * step
-
-
-@kernel
-def verlet_step(elastic: Elastic, frequency_squared: float, surroundings: Surroundings) -> float:
-    """Return a stable step of position Verlet [s]."""
-    step: float = _step(VERLET_LIMIT, elastic, frequency_squared, surroundings)
-    return step
-
-
-@kernel
-def _step(
-    limit: float, elastic: Elastic, frequency_squared: float, surroundings: Surroundings
-) -> float:
-    """Return a stable step [s]; the elastic motion and the damping limit it each by itself."""
-    if frequency_squared == 0.0:
-        return math.inf  # every node is fixed
-    rate = damping_rate(elastic, surroundings)
-    return SAFETY / max(math.sqrt(frequency_squared) / limit, rate / DAMPING_LIMIT)
 
 
 @kernel

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.limits import LARGEST_COORDINATE, LARGEST_STRENGTH
 from tissue.core.three_vectors import Wrench
+from tissue.forces.attachments import SEVERED
 from tissue.geometry.rotations import checked_rotation
-from tissue.integrators.attachments import SEVERED
 from tissue.loads.frame_path import FramePath
 from tissue.loads.material_points import MaterialPoints
 

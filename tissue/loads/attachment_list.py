@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from tissue.integrators.attachments import (
+from tissue.forces.attachments import (
     CAUGHT,
     Attachments,
     attached_energy,
     frequency_squared,
     no_attachments,
 )
-from tissue.integrators.step_context import Increment
-from tissue.integrators.strand_crossing import catch_strands, note_strands
-from tissue.integrators.strands import free_strands, write_stiffening
+from tissue.forces.fibre_crossing import catch_strands, note_strands
+from tissue.forces.fibres import free_strands, write_stiffening
+from tissue.forces.step_context import Increment
 from tissue.loads.attachment import Attachment
 from tissue.mesh.body import Body
 

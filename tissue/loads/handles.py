@@ -9,9 +9,9 @@ import numpy.typing as npt
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.simd import room_for_points
 from tissue.core.three_vectors import BladeSweep
+from tissue.forces.step_context import Increment
+from tissue.forces.terms import write_support_forces
 from tissue.integrators.model import TissueModel
-from tissue.integrators.step_context import Increment
-from tissue.integrators.supports import write_support_forces
 from tissue.loads.attachment import Attachment
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.load import Load, Loads

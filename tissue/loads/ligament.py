@@ -15,7 +15,7 @@ class Ligament(Attachment):
     """Strands from points of a tissue to other places: each pulls where it is taut.
 
     The edge of the blade bends the strands that it sweeps across, and cuts them
-    (`tissue.integrators.strands`). The other ends are fixed to a frame: the world, until `move`.
+    (`tissue.forces.fibres`). The other ends are fixed to a frame: the world, until `move`.
 
     Args:
         points: The points of the tissue, each with its share of stiffness and cross-section.

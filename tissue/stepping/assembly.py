@@ -15,16 +15,16 @@ from tissue.cutting.incision import Incision
 from tissue.cutting.scheme import checked_scheme
 from tissue.cutting.scheme_choice import scheme_of
 from tissue.cutting.snapping import EXPLAINED
-from tissue.integrators.global_stepper import GlobalStepper, method_of
-from tissue.integrators.integrator import integrator_of
-from tissue.integrators.model import Numerics, TissueModel
-from tissue.integrators.options import (
+from tissue.integrators.global_stepper import GlobalStepper, integrator_of
+from tissue.integrators.methods import (
     Global,
     Hierarchical,
     IntegratorOptions,
     Verlet,
     checked_relaxation,
+    method_of,
 )
+from tissue.integrators.model import Numerics, TissueModel
 from tissue.material import Material, warn_of_ratio
 from tissue.mesh.body import build_body
 from tissue.mesh.validation import expect_sound

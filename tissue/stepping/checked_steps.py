@@ -16,7 +16,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.memento import Memento, Spares
 from tissue.core.three_vectors import BladeSweep
 from tissue.cutting.incision import NoRoomError
-from tissue.integrators.unstable import REMEDY, UnstableError
+from tissue.integrators.integrator import REMEDY, UnstableError
 from tissue.loads.handles import StepInputs
 from tissue.mesh.body import Body
 from tissue.state.tissue_state import RULES

@@ -5,16 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.blade.edge import Edge
-from tissue.blade.forces import edge_energy
 from tissue.blade.impulse_totals import clear_works
-from tissue.blade.side_contact import sides_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.elasticity.energy import kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
-from tissue.integrators.attachments import attached_energy
+from tissue.forces.attachments import attached_energy
+from tissue.forces.step_context import StepContext
+from tissue.forces.terms import energy_of_terms
 from tissue.integrators.model import TissueModel
-from tissue.integrators.step_context import StepContext
 from tissue.mesh.changes import ChangedMesh
 from tissue.types import Energies
 
@@ -89,8 +88,9 @@ def _write_amounts(
         out[1] = kinetic_energy(body)
         out[2] = potential_energy(body, context.surroundings.gravity)
     totals, contacts = blade.totals, context.contacts
-    out[3], out[4] = edge_energy(blade, body, edge, when), sides_energy(blade.sides)
-    out[5], out[6] = contacts.stored, contacts.work
+    stored = energy_of_terms(context, edge, when)
+    out[3], out[4] = stored.edge, stored.sides
+    out[5], out[6] = stored.contacts, contacts.work
     out[7], out[8] = totals.work_of_blade, context.supports.work
     out[9], out[10] = context.damping.dissipated, totals.work_of_cutting
     out[11], out[12] = totals.work_of_breaking, totals.work_of_friction

@@ -6,17 +6,15 @@ from typing import Final
 import numpy as np
 
 from tissue.blade.edge import Edge
-from tissue.blade.forces import edge_energy
-from tissue.blade.side_contact import sides_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes, kernel
 from tissue.core.structs import Arrays, FloatCell
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import elastic_energy
+from tissue.forces.step_context import StepContext
+from tissue.forces.terms import energy_of_terms
 from tissue.geometry.aabb import empty_box, with_point
-from tissue.integrators.attachments import attached_energy
 from tissue.integrators.model import TissueModel
-from tissue.integrators.step_context import StepContext
 from tissue.mesh.finite_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
@@ -222,11 +220,9 @@ def energy_in_springs(context: StepContext, edge: Edge, when: float) -> float:
         edge: The cutting edge over a time step.
         when: Instant of it, as a fraction.
     """
-    body, blade, attachments = context.body, context.blade, context.attachments
-    held: float = edge_energy(blade, body, edge, when) + sides_energy(blade.sides)
-    held += context.contacts.stored
-    held += attached_energy(attachments, body.positions, 0, len(attachments.nodes))
-    energy: float = elastic_energy(context.elastic, body) + held
+    stored = energy_of_terms(context, edge, when)
+    held: float = stored.edge + stored.sides + stored.contacts + stored.attachments
+    energy: float = elastic_energy(context.elastic, context.body) + held
     return energy
 
 

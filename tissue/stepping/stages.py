@@ -17,14 +17,13 @@ from tissue.core.array_types import FloatArray
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
 from tissue.cutting.incision import CutHooks, Incision
-from tissue.integrators.attachments import strand_boxes
+from tissue.forces.attachments import strand_boxes
+from tissue.forces.step_context import Increment
 from tissue.integrators.equilibrium import SETTLED, settle
 from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
-from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.global_stepper import GlobalStepper, expect_few_steps
 from tissue.integrators.integrator import Integrator
 from tissue.integrators.model import TissueModel
-from tissue.integrators.step_context import Increment
-from tissue.integrators.step_length import expect_few_steps
 from tissue.loads.handles import Handles
 from tissue.material import Material
 from tissue.mesh.body import Body
@@ -74,7 +73,7 @@ class StepStages:
         """Boxes that together hold the body."""
         self._slit_reach = slit_reach
         self._bounds = bounds_of_body(model.body)
-        self._at_first = model.measures(global_stepper.method.limit)
+        self._at_first = model.measures(global_stepper.method.number)
         self.make_room()
         audit.begin(model, NOWHERE)
 
@@ -104,7 +103,7 @@ class StepStages:
         edge = NOWHERE if sweep is None else edge_of(sweep)
         dt = _checked_time_step(dt)
         model, incision, handles = self.model, self.incision, self.handles
-        expect_few_steps(model, self.global_stepper.method.limit, dt)
+        expect_few_steps(model, self.global_stepper.method.number, dt)
         travel = edge.travel if has_blade else 0.0
         n = incision.n_increments(travel)
         self._begin_step(sweep, edge, dt)
@@ -246,7 +245,7 @@ class StepStages:
             node_size=model.node_size,
             guard=0.0 if solver.scheme == "paper" else solver.cut.guard * model.node_size,
             initial=self._at_first,
-            now=model.measures(self.global_stepper.method.limit),
+            now=model.measures(self.global_stepper.method.number),
         )
 
     def cut_along(self, rows: FloatArray, directions: FloatArray) -> float:

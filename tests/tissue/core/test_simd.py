@@ -21,8 +21,8 @@ from tissue.core.simd import (
     times,
     unfused,
 )
-from tissue.integrators.hierarchical.kernels import new_trails
-from tissue.integrators.stages import Stages
+from tissue.forces.step_context import Stages
+from tissue.integrators.bielser_1998.kernels import new_trails
 from tissue.mesh.body import grown
 
 pytestmark = pytest.mark.kernel

@@ -10,13 +10,8 @@ from tissue.core.vec3 import Vec3
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
-from tissue.integrators.stability import (
-    NYSTROEM_SAFETY,
-    SAFETY,
-    nystroem_step,
-    stage_damped_step,
-    verlet_step,
-)
+from tissue.integrators.methods import METHODS
+from tissue.integrators.stability import stable_step
 from tissue.mesh.body import build_body
 from tissue.mesh.star import no_visits
 
@@ -63,23 +58,23 @@ def verlet_matrix(k, c, h):
     return drift @ kick @ drift @ damping_matrix(c, h)
 
 
-METHODS = {
-    "Runge-Kutta, damping in stages": (runge_kutta_matrix, stage_damped_step, SAFETY),
-    "Nystroem": (nystroem_matrix, nystroem_step, NYSTROEM_SAFETY),
-    "Verlet": (verlet_matrix, verlet_step, SAFETY),
+STEP_MATRICES = {
+    "runge_kutta": runge_kutta_matrix,
+    "nystroem": nystroem_matrix,
+    "verlet": verlet_matrix,
 }
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("retardation_time", [0.0, 1e-4, 1e-3, 1e-2, 1.0])
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.45, 0.49])
-def test_no_mode_grows_in_a_stable_step_with_any_damping(retardation_time, poisson_ratio, method):
+def test_no_mode_grows_in_a_stable_step_with_any_damping(retardation_time, poisson_ratio, name):
     """Steps of M x'' + C x' + K x = 0 as matrices; K of tetrahedra, C of springs.
 
-    Neither method comes with a proof where K and C have other modes, so two steps are tried: the
+    No method comes with a proof where K and C have other modes, so two steps are tried: the
     longest by the limits, and the one that is taken.
     """
-    step_matrix, stable_step, safety = METHODS[method]
+    method, step_matrix = METHODS[name], STEP_MATRICES[name]
     material = Material(law="neo_hookean", poisson_ratio=poisson_ratio)
     springs = replace(SPRINGS, young_modulus=material.spring_modulus)
     root = 1.0 / np.sqrt(np.repeat(masses(MESH, material.density), 3))
@@ -88,7 +83,7 @@ def test_no_mode_grows_in_a_stable_step_with_any_damping(retardation_time, poiss
     body = build_body(MESH, None, None)
     elasticity = Elasticity(material, body, no_visits(len(body.rest), len(body.tetrahedra)))
     around = Surroundings(gravity=Vec3(0.0, 0.0, 0.0), drag=0.0, retardation_time=retardation_time)
-    h = stable_step(elasticity.arrays, elasticity.frequency_squared, around)
-    for step in (h, h / safety):
+    h = stable_step(method.number, elasticity.arrays, elasticity.frequency_squared, around)
+    for step in (h, h / method.safety):
         # The six rigid motions have double eigenvalues of 1, which rounding separates.
         assert np.abs(np.linalg.eigvals(step_matrix(k, c, step))).max() < 1.0 + 1e-4

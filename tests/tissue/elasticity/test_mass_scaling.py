@@ -10,7 +10,7 @@ from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.limited_frequency import limited_frequency
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP
 from tissue.elasticity.strained_frequency import StepLimit
-from tissue.integrators.runge_kutta import accelerations
+from tissue.forces.terms import accelerations
 
 MESH = block((6, 6, 3), (0.06, 0.06, 0.03))
 FREE = {"viscous_damping": 0.0, "retardation_time": 0.0}

@@ -8,20 +8,20 @@ from tissue import BoolArray, FloatArray, Hierarchical
 from tissue.blade.edge import NOWHERE
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.integrators.hierarchical.kernels import (
+from tissue.integrators.bielser_1998.kernels import (
     FrameTimes,
     Trails,
     hierarchical_frame,
     new_trails,
 )
-from tissue.integrators.hierarchical.node_rings import (
+from tissue.integrators.bielser_1998.node_rings import (
     Rings,
     add_focus,
     begin_search,
     new_rings,
     search,
 )
-from tissue.integrators.hierarchical.stepper import ring_steps
+from tissue.integrators.bielser_1998.stepper import ring_steps
 
 FREE_FALL = Vec3(0.0, 0.0, -9.81)
 

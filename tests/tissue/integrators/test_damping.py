@@ -16,13 +16,12 @@ from tests.tissue.kernels_of import elastic_of, network_of, oscillator
 from tissue import block
 from tissue.elasticity.internal_forces import elastic_energy
 from tissue.integrators.damping import LONGEST_INTERVAL
-from tissue.integrators.stability import DAMPING_LIMIT, NYSTROEM_LIMIT, VERLET_LIMIT
-from tissue.integrators.substeps import nystroem_steps, verlet_steps
+from tissue.integrators.methods import METHODS
+from tissue.integrators.stability import DAMPING_LIMIT
 
 pytestmark = pytest.mark.kernel
 
-METHODS = {"Nystroem": nystroem_steps, "Verlet": verlet_steps}
-LIMITS = {"Nystroem": NYSTROEM_LIMIT, "Verlet": VERLET_LIMIT}
+NAMES = [name for name, method in METHODS.items() if method.damps_between_steps]
 STEPS = [40, 80, 160, 320]
 INTERVALS = range(1, LONGEST_INTERVAL + 1)
 
@@ -31,16 +30,16 @@ def state_after_a_second(method, n, damping, interval=1):
     """Return x and x' of the oscillator of `exact_state`."""
     network = oscillator(FREQUENCY, **damping)
     network.body.positions[1, 0] = 1.3
-    network.damped_between_steps(METHODS[method], 1.0 / n, n, interval=interval)
+    network.damped_between_steps(METHODS[method].number, 1.0 / n, n, interval=interval)
     return np.array([network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]])
 
 
-@pytest.mark.parametrize(("method", "expected"), [("Nystroem", 4.0), ("Verlet", 2.0)])
-def test_without_damping_the_order_is_that_of_the_method(method, expected):
+@pytest.mark.parametrize("method", NAMES)
+def test_without_damping_the_order_is_that_of_the_method(method):
     errors = [
         np.abs(state_after_a_second(method, n, {}) - exact_state(1.0, {})).max() for n in STEPS
     ]
-    assert order(STEPS, errors) == pytest.approx(expected, abs=0.05)
+    assert order(STEPS, errors) == pytest.approx(METHODS[method].order, abs=0.05)
 
 
 def error_with_rate(method, n, damping, rate, interval):
@@ -60,7 +59,7 @@ DAMPED = ["drag", "retardation", "both"]
 
 @pytest.mark.parametrize("damping", DAMPED)
 @pytest.mark.parametrize("interval", INTERVALS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", NAMES)
 def test_with_damping_between_steps_the_order_is_one(method, interval, damping):
     given = DAMPINGS[damping]
     errors = [error_with_rate(method, n, given, rate_of(given), interval) for n in STEPS]
@@ -69,7 +68,7 @@ def test_with_damping_between_steps_the_order_is_one(method, interval, damping):
 
 @pytest.mark.parametrize("damping", DAMPED)
 @pytest.mark.parametrize("interval", INTERVALS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", NAMES)
 def test_the_error_is_a_rate_too_high_by_half_of_rate_times_interval(method, interval, damping):
     """It multiplies by 1 - r s, as the rate -ln(1 - r s) / s = r (1 + r s / 2 + ...) does.
 
@@ -92,7 +91,7 @@ def limit_of(method, ratio, by_drag, interval):
     def growth(step):
         def take_step():
             network.damped_between_steps(
-                METHODS[method], step, interval, interval=interval, is_running=True
+                METHODS[method].number, step, interval, interval=interval, is_running=True
             )
 
         return growth_of(network, take_step)
@@ -103,19 +102,19 @@ def limit_of(method, ratio, by_drag, interval):
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.3, 0.6, 1.0, 2.0])
 @pytest.mark.parametrize("by_drag", [True, False], ids=["drag", "retardation"])
 @pytest.mark.parametrize("interval", INTERVALS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", NAMES)
 def test_elastic_motion_and_damping_limit_the_step_each_by_itself(method, interval, by_drag, ratio):
     """The rate of damping is 2 ratio w. Some damping makes longer Runge-Kutta steps stable."""
     of_damping = DAMPING_LIMIT / (2.0 * ratio * interval) if ratio > 0.0 else np.inf
-    expected = min(LIMITS[method], of_damping)
+    expected = min(METHODS[method].limit, of_damping)
     found = limit_of(method, ratio, by_drag, interval)
     assert expected <= found + 0.001
-    if method == "Verlet" or ratio in (0.0, 1.0, 2.0):
+    if method == "verlet" or ratio in (0.0, 1.0, 2.0):
         assert found == pytest.approx(expected, abs=0.005)
 
 
 @pytest.mark.parametrize("interval", INTERVALS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", NAMES)
 def test_what_damping_takes_is_what_the_body_loses(method, interval):
     """A shaken block: kinetic and elastic energy and what was dissipated are constant."""
     mesh = block((2, 2, 1), (0.04, 0.04, 0.02))
@@ -128,6 +127,6 @@ def test_what_damping_takes_is_what_the_body_loses(method, interval):
         return 0.5 * body.masses @ (body.velocities**2).sum(axis=1) + elastic_energy(elastic, body)
 
     before = energy()
-    damping = network.damped_between_steps(METHODS[method], 2e-5, 200, interval=interval)
+    damping = network.damped_between_steps(METHODS[method].number, 2e-5, 200, interval=interval)
     assert damping.dissipated > 0.05 * before
     assert before - energy() == pytest.approx(damping.dissipated, rel=1e-3)

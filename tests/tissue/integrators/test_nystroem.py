@@ -8,9 +8,8 @@ from tests.tissue.integrators.test_runge_kutta import order
 from tests.tissue.kernels_of import network_of
 from tissue import block
 from tissue.core.jit import is_compiling
+from tissue.integrators.methods import METHODS, NYSTROEM
 from tissue.integrators.nystroem import INSTANTS, WEIGHTS
-from tissue.integrators.stability import NYSTROEM_LIMIT
-from tissue.integrators.substeps import nystroem_steps
 
 MESH = block((3, 2, 2), (0.06, 0.04, 0.04))
 SECOND = INSTANTS[1]
@@ -57,7 +56,7 @@ def test_a_step_is_that_of_the_published_family_at_one_third():
     x, v = body.positions.copy(), body.velocities.copy()
     for _ in range(3):
         x, v = naive_runge_kutta.three_stages(acceleration, x, v, 2e-4, SECOND)
-    network.damped_between_steps(nystroem_steps, 2e-4, 3)
+    network.damped_between_steps(NYSTROEM, 2e-4, 3)
     np.testing.assert_allclose(body.positions, x, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(body.velocities, v, rtol=0.0, atol=1e-12)
 
@@ -65,7 +64,7 @@ def test_a_step_is_that_of_the_published_family_at_one_third():
 def test_the_order_is_four_on_a_network_of_springs():
     def after(n, seconds=0.04):
         network = bent()
-        network.damped_between_steps(nystroem_steps, seconds / n, n)
+        network.damped_between_steps(NYSTROEM, seconds / n, n)
         return network.body.positions.copy()
 
     steps = [80, 113, 160, 226]
@@ -81,7 +80,7 @@ def test_weights_and_instants_integrate_polynomials_of_third_degree():
 
 def test_the_limit_of_stability_is_the_root_of_twelve():
     assert limit_of_stability(SECOND) == pytest.approx(np.sqrt(12.0), abs=2e-3)
-    assert np.sqrt(12.0) - 2e-4 < NYSTROEM_LIMIT < np.sqrt(12.0)
+    assert np.sqrt(12.0) - 2e-4 < METHODS["nystroem"].limit < np.sqrt(12.0)
 
 
 def test_no_other_method_of_the_family_is_stable_as_far_or_takes_as_little_energy():
@@ -103,5 +102,5 @@ def test_momentum_is_kept_to_rounding():
     body = network.body
     body.velocities[:] = np.random.default_rng(1).normal(0.0, 0.1, body.velocities.shape)
     before = body.masses @ body.velocities
-    network.damped_between_steps(nystroem_steps, 2e-4, 500)
+    network.damped_between_steps(NYSTROEM, 2e-4, 500)
     np.testing.assert_allclose(body.masses @ body.velocities, before, atol=1e-15)

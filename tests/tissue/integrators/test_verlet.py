@@ -9,8 +9,7 @@ from tests.tissue.kernels_of import elastic_of, network_of
 from tissue import block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.internal_forces import elastic_energy
-from tissue.integrators.stability import VERLET_LIMIT
-from tissue.integrators.substeps import verlet_steps
+from tissue.integrators.methods import METHODS, VERLET
 
 MESH = block((3, 2, 2), (0.06, 0.04, 0.04))
 
@@ -34,7 +33,7 @@ def energy(network):
 
 def positions_after(n, seconds=0.04):
     network = bent()
-    network.damped_between_steps(verlet_steps, seconds / n, n)
+    network.damped_between_steps(VERLET, seconds / n, n)
     return network.body.positions.copy()
 
 
@@ -50,7 +49,7 @@ def test_a_motion_whose_velocities_are_reversed_returns():
     network = bent()
     begin = network.body.positions.copy()
     for _ in range(2):
-        network.damped_between_steps(verlet_steps, 2e-4, 20)
+        network.damped_between_steps(VERLET, 2e-4, 20)
         network.body.velocities *= -1.0
     assert np.abs(network.body.positions - begin).max() < 1e-12
 
@@ -62,11 +61,11 @@ def test_the_energy_does_not_drift_in_ten_thousand_steps(share):
     network = bent(0.002)  # in strong compression springs are stiffer than at rest
     before = energy(network)
     frequency = np.sqrt(network.springs.frequency_squared.max())
-    h, energies = share * VERLET_LIMIT / frequency, []
+    h, energies = share * METHODS["verlet"].limit / frequency, []
     for _ in range(100):
         means = []
         for _ in range(10):
-            network.damped_between_steps(verlet_steps, h, 10)
+            network.damped_between_steps(VERLET, h, 10)
             means.append(energy(network))
         energies.append(np.mean(means))
     drift = np.polyfit(np.arange(len(energies)), energies, 1)[0] * len(energies)

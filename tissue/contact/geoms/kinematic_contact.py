@@ -1,6 +1,6 @@
 """Contact with geoms after a substep: the impulses that keep nodes and faces outside.
 
-In a substep what touches is held by reactions (`tissue.integrators.geom_reactions`). Then each
+In a substep what touches is held by reactions (`tissue.forces.geom_reactions`). Then each
 contact gets the change of its impulse that lets its point move no further into the geom, and
 within Coulomb's cone not along it either. What rests is so in exact balance, what slides is braked
 by the friction coefficient times the pressure, and no stiffness of contact is chosen or limits the

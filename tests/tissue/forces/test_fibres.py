@@ -1,0 +1,129 @@
+"""Strands on the edge of the blade: what it sweeps across, and the force on the bend."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tissue.blade.edge import Edge
+from tissue.core.vec3 import Vec3
+from tissue.forces.attachments import CAUGHT, SEVERED, STRAIGHT, holding_energy, no_attachments
+from tissue.forces.fibre_crossing import catch_strands, note_strands
+from tissue.forces.fibres import force_at, slip_strands
+
+pytestmark = pytest.mark.kernel
+
+POSITIONS = np.array([[0.0, 0.0, -1.0]] + [[9.0, 9.0, 9.0]] * 3)
+"""The strand goes from its first node, (0, 0, -1), to (0, 0, 1)."""
+
+
+def strand(**fields):
+    found = no_attachments(1)
+    found.nodes[0], found.weights[0] = range(4), (1.0, 0.0, 0.0, 0.0)
+    found.begin[0] = found.end[0] = (0.0, 0.0, 1.0)
+    numbers = {"stiffness": 10.0, "length": 2.0, "section": 1e-2, "toughness": 50.0}
+    for name, value in (numbers | fields).items():
+        getattr(found, name)[0] = value
+    return found
+
+
+def edge(y0, y1, *, x=(-1.0, 1.0), z=0.0, forward=1.0, lift=0.0):
+    """An edge along x, of which the heel is `lift` higher, that moves from y0 to y1."""
+    ends = [Vec3(x[0], y, z) for y in (y0, y1)], [Vec3(x[1], y, z + lift) for y in (y0, y1)]
+    ahead = Vec3(0.0, forward, 0.0)
+    return Edge(ends[0][0], ends[1][0], ahead, ends[0][1], ends[1][1], ahead)
+
+
+def swept(strands, *edges):
+    for each in edges:
+        note_strands(strands, POSITIONS, 0.0)
+        catch_strands(strands, POSITIONS, each, 0.0, 1.0)
+    return strands
+
+
+def test_an_edge_that_sweeps_across_a_strand_catches_it_where_it_passes():
+    found = swept(strand(), edge(-0.1, 0.3, x=(-0.25, 0.75), z=0.5))
+    assert found.state[0] == CAUGHT and found.n_caught == 1
+    np.testing.assert_allclose(found.place[0], [0.25, 0.3])  # from the tip; the edge is ahead
+    np.testing.assert_allclose(found.bend[0], [0.0, 0.0, 0.5])
+    assert found.released == 0.0
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [
+        {"x": (0.01, 1.0)},
+        {"x": (-1.0, -0.01)},
+        {"z": 1.01},
+        {"z": -1.01},
+        {"forward": -1.0},
+        {"x": (-5e-8, 5e-8), "lift": 2.0, "z": -1.0},
+    ],
+    ids=["tip", "heel", "above", "below", "back", "along it"],
+)
+def test_an_edge_that_passes_beside_it_does_not(beside):
+    assert swept(strand(), edge(-0.1, 0.3, **beside)).state[0] == STRAIGHT
+
+
+def test_a_crossing_that_two_increments_share_is_found_once():
+    """The edge stops on the strand: touching counts as one of the sides, in both increments."""
+    for parts in ([-0.1, 0.0, 0.1], [0.1, 0.0, -0.1]):
+        ahead = 1.0 if parts[0] < 0 else -1.0
+        states = []
+        found = strand()
+        for y0, y1 in pairwise(parts):
+            swept(found, edge(y0, y1, forward=ahead))
+            states.append(found.state[0])
+        assert states[-1] == CAUGHT and found.n_caught == 1
+
+
+def test_an_edge_without_motion_catches_nothing():
+    for y in (-0.1, 0.0, 0.1):
+        assert swept(strand(), edge(y, y)).state[0] == STRAIGHT
+
+
+def test_a_strand_that_moves_onto_an_edge_at_rest_is_caught():
+    found = strand()
+    found.before[0] = (0.0, 0.1, -1.0, 0.0, 0.1, 1.0)
+    catch_strands(found, POSITIONS, edge(0.05, 0.05), 0.0, 1.0)
+    assert found.state[0] == CAUGHT
+
+
+def test_the_force_on_the_bend_is_the_slope_of_the_energy():
+    found, step, random = strand(), 1e-6, np.random.default_rng(0)
+    x, end = Vec3(0.0, 0.0, -1.0), Vec3(0.0, 0.0, 1.0)
+
+    def energy(bend):
+        lengths = [np.linalg.norm(bend - np.array(each)) for each in (x, end)]
+        return holding_energy(found, 0, sum(lengths))
+
+    for bend in random.uniform(-0.5, 0.5, (10, 3)):
+        slope = [
+            (energy(bend + step * axis) - energy(bend - step * axis)) / (2.0 * step)
+            for axis in np.eye(3)
+        ]
+        force = force_at(found, 0, Vec3(*bend), x, end)
+        np.testing.assert_allclose(force, -np.array(slope), atol=1e-6)
+
+
+def test_a_slip_spends_the_energy_that_the_string_loses_and_leaves_the_resistance():
+    """Section 0.01 m2 is 0.113 m across: the edge goes in at 50 * 0.01 / 0.113 = 4.43 N."""
+    found = swept(strand(), edge(-0.1, 0.0), edge(0.0, 1e-9))
+    x, end = Vec3(0.0, 0.0, -1.0), Vec3(0.0, 0.0, 1.0)
+    there = edge(0.0, 0.75)
+    before = holding_energy(found, 0, 2.0 * np.hypot(1.0, 0.75 - found.place[0, 1]))
+    slip_strands(found, POSITIONS, there, 1.0)
+    after = holding_energy(found, 0, 2.0 * np.hypot(1.0, found.bend[0, 1]))
+    assert found.state[0] == CAUGHT
+    assert found.severing == pytest.approx(before - after) and before > after
+    force = force_at(found, 0, Vec3(*found.bend[0]), x, end)
+    np.testing.assert_allclose(force, [0.0, -0.5 / np.sqrt(0.04 / np.pi), 0.0], atol=1e-9)
+
+
+def test_a_strand_is_severed_for_just_its_energy():
+    found = swept(strand(), edge(-0.1, 0.0), edge(0.0, 1e-9))
+    before = holding_energy(found, 0, 2.0 * np.hypot(1.0, 2.0))
+    slip_strands(found, POSITIONS, edge(0.0, 2.0), 1.0)
+    assert found.state[0] == SEVERED and found.n_caught == 0
+    assert found.severing == 0.5
+    assert found.released == pytest.approx(before - 0.5)

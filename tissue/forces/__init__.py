@@ -1,0 +1,1 @@
+"""What acts on nodes and is no part of the body itself, and all of it in one list (`terms`)."""

@@ -1,0 +1,93 @@
+"""The focus of the relaxation, where the tip of the blade is (paper, section 5.2)."""
+
+from tissue.blade.anchors import ANCHORED, holding_node, n_holding_nodes
+from tissue.blade.blade_state import BladeState
+from tissue.blade.blunt_contact import PRESSING
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.elasticity.springs import Springs
+from tissue.integrators.bielser_1998.node_rings import (
+    Rings,
+    add_focus,
+    append_node,
+    begin_search,
+    search,
+)
+from tissue.mesh.body import Body
+
+N_CORNERS = 4
+"""Nodes of a tetrahedron."""
+
+
+@kernel
+def find_held(held: Rings, body: Body, blade: BladeState) -> None:
+    """Make the nodes that the blade acts on ring 0 of `held`.
+
+    The nodes of the anchor nearest to the tip come first. Without any, `held` stays as it was.
+    """
+    anchors, sides, blunt = blade.anchors, blade.sides, blade.blunt
+    n = 0
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            if n == 0:
+                begin_search(held)
+            n += 1
+            for i in range(n_holding_nodes(anchors, k)):
+                add_focus(held, holding_node(anchors, body, k, i))
+    for i in range(sides.n_faces):
+        if n == 0:
+            begin_search(held)
+        n += 1
+        for corner in range(3):
+            add_focus(held, sides.node[i, corner])
+    if blunt.n_pressing > 0:
+        for k in range(len(blunt.state)):
+            if blunt.state[k] >= PRESSING:
+                if n == 0:
+                    begin_search(held)
+                n += 1
+                for q in range(N_CORNERS):
+                    add_focus(held, body.tetrahedra[blunt.tetrahedron[k], q])
+
+
+@kernel
+def find_rings(
+    rings: Rings, held: Rings, springs: Springs, last_ring: int, scratch: IntArray
+) -> None:
+    """Find the rings around the tip of the blade: the active point tetrahedron is the focus.
+
+    The other nodes that the blade holds, along its edge, are put into ring 0 as well, so that all
+    of them are at the same instant whenever it pulls on them; but no rings grow around them.
+
+    Args:
+        rings: Written.
+        held: The nodes that `find_held` found.
+        springs: The rows of neighbours.
+        last_ring: Last ring of the search.
+        scratch: Shape (capacity,).
+    """
+    begin_search(rings)
+    for k in range(min(N_CORNERS, held.n_found)):
+        add_focus(rings, held.order[k])
+    search(rings, springs, last_ring)
+    n = rings.n_found
+    for k in range(n):
+        scratch[k] = rings.order[k]
+    rings.n_found = 0
+    for k in range(held.n_found):
+        append_node(rings, held.order[k], 0)
+    for k in range(n):
+        if rings.ring[scratch[k]] > 0:
+            append_node(rings, scratch[k], rings.ring[scratch[k]])
+    _append_neighbours(rings, held, springs, last_ring)
+
+
+@kernel
+def _append_neighbours(rings: Rings, held: Rings, springs: Springs, last_ring: int) -> None:
+    """Append the neighbours of held nodes that were beyond the last ring."""
+    for k in range(held.n_found):
+        first = springs.first[held.order[k]]
+        for slot in range(first, first + springs.count[held.order[k]]):
+            other = springs.neighbour[slot]
+            if rings.seen[other] != rings.epoch:
+                append_node(rings, other, last_ring)

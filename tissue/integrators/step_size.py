@@ -1,0 +1,389 @@
+"""Into how many steps an increment is divided: as many as stability needs, and not more.
+
+Where stiffness depends on how far the body is strained, an increment is divided into parts of
+two steps, and the number of steps is chosen anew for each part.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.simd import point, store_point, times
+from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.elasticity.neo_hookean import keeps_gradients
+from tissue.elasticity.stiffening import stiffens
+from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
+from tissue.forces.step_context import StepContext
+from tissue.forces.terms import bound_of_terms, press_at_rest
+from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
+from tissue.integrators.methods import METHODS, OF_LAST_STEP, OF_NEXT_STEP
+from tissue.integrators.node_loops import (
+    DISPLACEMENTS,
+    DISPLACEMENTS_LAST,
+    GRADIENTS,
+    run_loop,
+)
+from tissue.integrators.resting import (
+    CALM_FASTEST,
+    CALM_SPEED,
+    CALM_WAY,
+    TIME_TO_REST,
+    have_stayed,
+    keep_positions,
+    may_rest,
+    mean_speed,
+    stop_nodes,
+)
+from tissue.integrators.stability import damping_rate, stable_step
+from tissue.mesh.bounding_boxes import largest_speed
+
+STEPS_BETWEEN_STRAIN_BOUNDS: Final = 2
+"""Steps between two bounds on the frequencies of the strained body. A lip that snaps back, or is
+pinched, is as much shorter within a frame of eight steps as an element is long."""
+
+MOTION_BETWEEN_STRAIN_BOUNDS: Final = 0.001
+"""How far a node may move from one bound to the next where there are more steps between them, as a
+share of the node size: some percent of the least altitude of slivers. With 0.01 slivers of the
+organ went on trembling at 0.06 m/s a second after ten strokes; with this they are at rest. A bound
+takes as long as half a step: without this a body at rest would be looked at as often as one that
+swings."""
+
+_SAME_LIMIT = 1e-6
+"""Relative difference of two limits of w^2 below which they are the same: they differ by rounding
+where steps are as long as before."""
+
+LONGEST_MOTION: Final = 0.5
+"""How far the fastest node moves in a step, as a share of the node size, at most. A bound on
+frequencies holds where the body is; what moves farther may be stiffer before the next bound. With
+less, strokes take more steps; without it, a body far from rest can become unstable."""
+
+MOST_STEPS: Final = 5_000.0
+"""Steps of an increment that are always allowed. In 160 blocks that recovered from random positions
+of their nodes it was 150 times as many as at rest, of which a millisecond takes 1 to 20. Without a
+limit, motion that has become unstable takes more and more steps and never ends."""
+
+MOST_OF_LONG: Final = 20.0
+"""Steps of a long increment at most, per step that the body at rest would take. With more, a second
+in which tissue is torn about could take minutes, and nobody would learn why; in shorter time steps
+it can be done."""
+
+_GRADIENTS: Final = tuple(method.gradients for method in METHODS.values())
+_FOLLOWS_SLIVERS: Final = tuple(method.follows_slivers for method in METHODS.values())
+
+_ROUNDING = 1e-9
+"""Share by which a frequency stays below that which would take another step."""
+
+
+class StepChoice(Arrays):
+    """The steps of one increment: what they depend on, and the part that is taken next."""
+
+    method: IntCell
+    """Whose steps they are: its number in `tissue.integrators.methods`."""
+    done: IntCell
+    """Steps of the increment taken so far."""
+    n_steps: IntCell
+    """Steps of the part that is taken next."""
+    refinement: IntCell
+    """How many times as many steps are taken as motion and stability ask for."""
+    is_at_rest: IntCell
+    """1 while the body is not moved, as it has been calm and nothing touches it, else 0."""
+    is_unstable: IntCell
+    """1 if the motion became unstable: it would take too many steps: see `MOST_STEPS`."""
+    dt: FloatCell
+    """Length of the time step [s]."""
+    begin: FloatCell
+    """Fraction of the time step at which the part begins."""
+    part_seconds: FloatCell
+    """Length of the last part [s]."""
+    part_end: FloatCell
+    """Fraction of the time step at which the part ends."""
+    end: FloatCell
+    """Fraction of the time step at which the increment ends."""
+    span: FloatCell
+    """Length of the increment [s]."""
+    of_contact: FloatCell
+    """What contact adds to w^2 at most [1/s2]; written before an increment begins."""
+    least: FloatCell
+    """Bound on w^2 with the body at rest, the blade and contact [1/s2]."""
+    added: FloatCell
+    """What contact adds to w^2, and the blade where tissue stiffens [1/s2]."""
+    asked: FloatCell
+    """Steps that the motion asks for in the rest of the increment."""
+    at_rest: FloatCell
+    """Steps that the body at rest would take for it."""
+    strained: FloatCell
+    """The last bound on w^2 of the tetrahedra as they are deformed [1/s2]."""
+    allowed: FloatCell
+    """Up to which w^2 it was not brought near the truth [1/s2]."""
+    moved: FloatCell
+    """How far nodes have moved since, at most [m]."""
+    calm: FloatCell
+    """How long the body has been calm, and nothing has touched it [s]."""
+    calm_positions: FloatArray
+    """Where the nodes were when the body became calm [m], shape (n_nodes, 3)."""
+    speed: FloatCell
+    """Speed of the fastest node at the begin of the part [m/s]."""
+    node_size: float
+    """Mean node size of the body [m]."""
+    surroundings: Surroundings
+    """Gravity and all damping."""
+    no_frequency: FloatArray
+    """Zeros, shape (node capacity,)."""
+
+
+def new_step_choice(
+    method: int, node_size: float, surroundings: Surroundings, n_nodes: int
+) -> StepChoice:
+    """Return that no increment has begun, with room for that many nodes."""
+    return StepChoice(
+        method=method,
+        done=0,
+        n_steps=0,
+        refinement=1,
+        is_at_rest=0,
+        is_unstable=0,
+        dt=0.0,
+        begin=0.0,
+        part_seconds=0.0,
+        part_end=0.0,
+        end=0.0,
+        span=0.0,
+        of_contact=0.0,
+        least=0.0,
+        added=0.0,
+        asked=0.0,
+        at_rest=0.0,
+        strained=0.0,
+        allowed=0.0,
+        moved=math.inf,
+        calm=0.0,
+        calm_positions=np.zeros((n_nodes, 3)),
+        speed=0.0,
+        node_size=node_size,
+        surroundings=surroundings,
+        no_frequency=np.zeros(n_nodes),
+    )
+
+
+@kernel
+def room_for_contact(choice: StepChoice, context: StepContext, seconds: float) -> float:
+    """Return what contact may add to w^2 of the body without another step [1/s2].
+
+    Args:
+        choice: The method, and all damping.
+        context: The body at rest.
+        seconds: Time to advance by [s].
+    """
+    elastic = context.elastic
+    longest = stable_step(choice.method, elastic, elastic.highest, choice.surroundings)
+    room: float = _without_another_step(elastic.highest, longest, seconds)[1] - elastic.highest
+    return room
+
+
+@kernel
+def begin_increment(
+    choice: StepChoice, context: StepContext, dt: float, begin: float, end: float
+) -> None:
+    """Begin an increment; nodes that the blade makes too fast get mass.
+
+    Args:
+        choice: Written, but for what contact adds.
+        context: What takes part.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which the increment begins.
+        end: Fraction of the time step at which it ends.
+    """
+    choice.done = 0
+    choice.is_unstable = 0
+    choice.dt = dt
+    choice.begin = choice.part_end = begin
+    choice.end = end
+    choice.span = dt * (end - begin)
+    if not choice.span > 0.0:
+        choice.end = begin  # no steps
+        return
+    _find_rest(choice, context)
+    if choice.is_at_rest == 1:
+        choice.end = begin
+        press_at_rest(context, choice.span)
+        return
+    _limit_mass(choice, context)
+    motion = choice.speed, choice.node_size, choice.span
+    bounds = bound_of_terms(context, choice.no_frequency, choice.of_contact, *motion)
+    choice.least, choice.added = bounds
+
+
+@kernel
+def _find_rest(choice: StepChoice, context: StepContext) -> None:
+    """Find out whether the body is at rest."""
+    if not may_rest(context, choice.surroundings.drag):
+        choice.calm = 0.0
+    choice.is_at_rest = 1 if choice.calm >= TIME_TO_REST else 0
+
+
+@kernel
+def note_calm(choice: StepChoice, context: StepContext) -> None:
+    """Note, after the steps of an increment, whether the body was calm; stop what comes to rest."""
+    body, size = context.body, choice.node_size
+    is_free = may_rest(context, choice.surroundings.drag)
+    is_slow = is_free and choice.speed <= CALM_FASTEST * size
+    if not is_slow or mean_speed(body) > CALM_SPEED * size:
+        choice.calm = 0.0
+    elif choice.calm == 0.0:
+        keep_positions(body, choice.calm_positions)
+        choice.calm = choice.span
+    elif have_stayed(body, choice.calm_positions, CALM_WAY * size):
+        choice.calm += choice.span
+    else:
+        choice.calm = 0.0
+    if choice.calm >= TIME_TO_REST:
+        stop_nodes(context)
+
+
+@kernel
+def next_part(choice: StepChoice, context: StepContext) -> bool:
+    """Choose the steps of the next part of an increment; return whether there is one.
+
+    There is none at its end, and where the motion became unstable.
+    """
+    choice.begin = choice.part_end
+    if choice.begin >= choice.end:
+        return False
+    elastic, surroundings = context.elastic, choice.surroundings
+    span = choice.dt * (choice.end - choice.begin)
+    longest = stable_step(choice.method, elastic, choice.least, surroundings)
+    n, highest = _without_another_step(choice.least, longest, span)
+    _note_motion(choice, context)
+    step = _strained_step(choice, context, StepLimit(highest - choice.added, choice.added, n))
+    choice.asked = max(span / step, choice.speed * span / choice.node_size / LONGEST_MOTION)
+    choice.at_rest = max(span / longest, 1.0)
+    # A comparison with nan is false.
+    if not choice.asked <= max(MOST_STEPS, MOST_OF_LONG * choice.at_rest):
+        choice.is_unstable = 1
+        return False
+    n = max(1, math.ceil(choice.refinement * choice.asked))
+    now, interval = damping_rate(elastic, surroundings), LONGEST_INTERVAL * span / n
+    accurate = now if _FOLLOWS_SLIVERS[choice.method] else context.damping.rate_uncut
+    is_slow = accurate * interval <= SLOW_DAMPING and now * interval <= FASTEST_DECAY
+    context.damping.interval = LONGEST_INTERVAL if is_slow else 1
+    choice.part_end = choice.end
+    if elastic.has_tetrahedra == 1 and n > STEPS_BETWEEN_STRAIN_BOUNDS:
+        share = STEPS_BETWEEN_STRAIN_BOUNDS / n
+        choice.part_end = choice.begin + share * (choice.end - choice.begin)
+        n = STEPS_BETWEEN_STRAIN_BOUNDS
+    choice.part_seconds = choice.dt * (choice.part_end - choice.begin)
+    choice.n_steps = n
+    choice.done += n
+    return True
+
+
+@kernel
+def _note_motion(choice: StepChoice, context: StepContext) -> None:
+    """Note how fast the fastest node is, and how far nodes moved in the part before."""
+    before, choice.speed = choice.speed, largest_speed(context.body)
+    choice.moved += max(before, choice.speed) * choice.part_seconds
+
+
+@kernel
+def _limit_mass(choice: StepChoice, context: StepContext) -> None:
+    """Let nodes get no mass between cuts where one step suffices for the increment without it."""
+    elastic, scaling = context.elastic, context.elastic.scaling
+    at_rest = elastic.highest + choice.of_contact
+    longest = stable_step(choice.method, elastic, at_rest, choice.surroundings)
+    n, highest = _without_another_step(at_rest, longest, choice.span)
+    scaling.allowed_between_cuts = max(scaling.allowed, highest) if n == 1 else scaling.allowed
+
+
+@kernel
+def _without_another_step(
+    frequency_squared: float, longest: float, span: float
+) -> tuple[int, float]:
+    """Return how many steps a frequency takes, and up to which w^2 [1/s2] it is no more.
+
+    Args:
+        frequency_squared: A bound on w^2 [1/s2].
+        longest: The longest step with it [s].
+        span: Time to advance by [s].
+    """
+    if math.isinf(longest):
+        return 1, math.inf
+    n = max(1, math.ceil(span / longest))
+    return n, (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2
+
+
+@kernel
+def _strained_step(choice: StepChoice, context: StepContext, limit: StepLimit) -> float:
+    """Return the largest stable step [s] until the next bound on the strained body.
+
+    Args:
+        choice: What the steps depend on.
+        context: Body and forces.
+        limit: The strained body is looked at no closer than the number of steps asks for.
+    """
+    elastic, strained = context.elastic, 0.0
+    elastic.solid.are_gradients_known = 0
+    if elastic.has_tetrahedra == 1:
+        if not _is_bound_known(choice, elastic.solid, limit):
+            _bound_strained_body(choice, context, limit)
+        strained = choice.strained
+    highest = max(choice.least, strained + limit.added)
+    step: float = stable_step(choice.method, elastic, highest, choice.surroundings)
+    return step
+
+
+@kernel
+def _is_bound_known(choice: StepChoice, solid: Solid, limit: StepLimit) -> bool:
+    """Return whether the last bound on the strained body still holds, and is as near the truth."""
+    if solid.is_bound_current == 0:
+        return False
+    is_near = choice.strained <= limit.allowed or choice.allowed <= limit.allowed * (
+        1.0 + _SAME_LIMIT
+    )
+    return is_near and choice.moved <= MOTION_BETWEEN_STRAIN_BOUNDS * choice.node_size
+
+
+@kernel
+def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLimit) -> None:
+    """Bound the frequencies of the body as it is deformed.
+
+    Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes will
+    be at the next one: an exponential law can double its modulus in two steps. The Nystroem method
+    begins where the bound is evaluated, and its first stage shares the gradients. Position Verlet
+    evaluated them last half a step before: where no tetrahedron has changed since, they are used.
+    """
+    elastic, body, visits = context.elastic, context.body, context.visits
+    solid, strained = elastic.solid, 0.0
+    keeps = keeps_gradients(solid)
+    is_known = (
+        keeps
+        and _GRADIENTS[choice.method] == OF_LAST_STEP
+        and solid.is_bound_current == 1
+        and not math.isinf(choice.moved)
+    )
+    if stiffens(solid.law):
+        highest = max(choice.least, choice.strained + limit.added)  # as it was last
+        step = stable_step(choice.method, elastic, highest, choice.surroundings)
+        if not math.isinf(step):  # every node is held
+            ahead, v = context.stages.last_positions, body.velocities
+            seconds = STEPS_BETWEEN_STRAIN_BOUNDS * step
+            for i in range(body.n_nodes):
+                store_point(ahead, i, point(body.positions, i) + times(seconds, point(v, i)))
+            if keeps:
+                run_loop(context, DISPLACEMENTS_LAST, 0.0)
+                run_loop(context, GRADIENTS, 0.0)
+            strained = strained_frequency(elastic, body, ahead, visits, limit, keeps)
+    if keeps and _GRADIENTS[choice.method] == OF_NEXT_STEP:
+        run_loop(context, DISPLACEMENTS, 0.0)
+        run_loop(context, GRADIENTS, 0.0)
+        solid.are_gradients_known = 1
+        is_known = True
+    found = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
+    choice.strained = max(strained, found)
+    choice.allowed = limit.allowed
+    choice.moved = 0.0
+    solid.is_bound_current = 1
