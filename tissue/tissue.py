@@ -15,7 +15,7 @@ from tissue.core.memento import Spares
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
 from tissue.loads.attachment import Attachment
-from tissue.loads.ligament import Ligament, ends_of_strands
+from tissue.loads.ligament import Ligament, ends_of_fibres
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints, points_of
 from tissue.material import Material
@@ -219,16 +219,16 @@ class Tissue:
         rest_length: float | None = None,
         breaks_at: float = math.inf,
     ) -> Ligament:
-        """Tie points of the tissue by strands to places in the world; return the ligament.
+        """Tie points of the tissue by fibres to places in the world; return the ligament.
 
-        The edge of the blade cuts the strands that it sweeps across (`tissue.forces.fibres`):
+        The edge of the blade cuts the fibres that it sweeps across (`tissue.forces.fibres`):
         cross-section times toughness is in `Energies.breaking`.
 
         Args:
             where: Points as `attach` takes them.
-            to: Where the strands end [m], shape (3,), or one place for each point, (n, 3).
-            stiffness: Of all strands together, along them [N/m].
-            area: Cross-section of all strands together [m2].
+            to: Where the fibres end [m], shape (3,), or one place for each point, (n, 3).
+            stiffness: Of all fibres together, along them [N/m].
+            area: Cross-section of all fibres together [m2].
             toughness: Energy of cutting them [J/m2].
             damping: Of all of them together, along them [N s/m].
             rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
@@ -238,7 +238,7 @@ class Tissue:
             ValueError: see `attach`; or `to` has another shape.
         """
         points = self._stages.handles.points_to_hold(where)
-        ends = ends_of_strands(self.positions_of(points), to, rest_length)
+        ends = ends_of_fibres(self.positions_of(points), to, rest_length)
         ligament = Ligament(points, *ends, stiffness, area, toughness, damping, breaks_at)
         return self._steps.begin_change().handles.attach(ligament)
 

@@ -95,7 +95,7 @@ class Energies(NamedTuple):
     """Energy lost as the mesh changes: impacts of nodes that part, and, under laws other than plain
     tetrahedra, elastic energy."""
     released: float
-    """Energy of contacts and strands that the blade released, and of attachments that let go, which
+    """Energy of contacts and fibres that the blade released, and of attachments that let go, which
     is lost; less that of attachments that began under tension."""
 
     @property

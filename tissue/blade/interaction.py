@@ -83,7 +83,7 @@ class BladeInteraction:
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
         """State for the kernels; replaced by another object when arrays grow."""
         self._shape, self._material = blade, material
-        self._n_strands = 0
+        self._n_fibres = 0
         self._renew_report()
         self._edge_length = 0.0
         self.edge_now = (NOWHERE, 1.0)
@@ -95,13 +95,13 @@ class BladeInteraction:
 
     def _renew_report(self) -> None:
         """Make a report with room for all contacts that the blade may have."""
-        self._report = new_report(self.state, self._n_strands)
+        self._report = new_report(self.state, self._n_fibres)
         self._views: dict[int, RigidContacts] = {}
 
-    def make_room_for_strands(self, n: int) -> None:
-        """Make room for that many contacts with strands."""
-        if n > self._n_strands:
-            self._n_strands = n
+    def make_room_for_fibres(self, n: int) -> None:
+        """Make room for that many contacts with fibres."""
+        if n > self._n_fibres:
+            self._n_fibres = n
             self._renew_report()
 
     @property

@@ -207,15 +207,15 @@ def write_report(report: WrenchReport, blade: BladeState, body: Body, edge: Edge
 
 
 @kernel
-def report_strand(
+def report_fibre(
     report: WrenchReport, pose: BladePose, at: Vec3, force: Vec3, stiffness: float
 ) -> None:
-    """Add a strand that goes around the edge to the report.
+    """Add a fibre that goes around the edge to the report.
 
     Args:
         report: Written, the number of contacts among its amounts too.
         pose: The blade at the end of the time step.
-        at: Where the strand is bent [m].
+        at: Where the fibre is bent [m].
         force: Force of the blade on it [N].
         stiffness: How that grows as the blade moves along it [N/m].
     """

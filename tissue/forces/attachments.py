@@ -25,7 +25,7 @@ method of the whole body, 2 for Verlet and 3.46 for the Nystroem method."""
 
 
 STRAIGHT, CAUGHT, SEVERED = 0, 1, 2
-"""State of what is between a point and its other end: STRAIGHT; CAUGHT, a strand that goes around
+"""State of what is between a point and its other end: STRAIGHT; CAUGHT, a fibre that goes around
 the edge of the blade (`tissue.forces.fibres`); SEVERED, nothing more."""
 
 
@@ -33,13 +33,13 @@ class Attachments(Arrays):
     """The attached points of a body, n of them."""
 
     n_caught: IntCell
-    """Number of strands that the blade has caught."""
+    """Number of fibres that the blade has caught."""
     work: FloatCell
     """Work of what moves from outside on springs and dampers, since it was last set to 0 [J]."""
     dissipated: FloatCell
     """Energy that the dampers took since the account of energy began [J]."""
     severing: FloatCell
-    """Energy that cutting strands took since then [J]."""
+    """Energy that cutting fibres took since then [J]."""
     released: FloatCell
     """Energy of springs that ended since then, less that of those that began [J]."""
     nodes: IntArray
@@ -56,22 +56,22 @@ class Attachments(Arrays):
     """Damping of each [N s/m], shape (n,)."""
     length: FloatArray
     """Length up to which each is slack [m], shape (n,): 0 for one that holds in all directions,
-    unless it is a strand."""
+    unless it is a fibre."""
     section: FloatArray
-    """Cross-section of each strand, which the blade can cut [m2], shape (n,); 0: it is none."""
+    """Cross-section of each fibre, which the blade can cut [m2], shape (n,); 0: it is none."""
     toughness: FloatArray
-    """Energy of cutting a strand [J/m2], shape (n,)."""
+    """Energy of cutting a fibre [J/m2], shape (n,)."""
     state: IntArray
     """STRAIGHT, CAUGHT or SEVERED, shape (n,)."""
     place: FloatArray
-    """Where a caught strand goes around the blade: along the edge from the tip, and behind the edge
+    """Where a caught fibre goes around the blade: along the edge from the tip, and behind the edge
     [m], shape (n, 2)."""
     bend: FloatArray
     """The same in space after the last step of the integrator [m], shape (n, 3)."""
     spent: FloatArray
     """Energy that was spent on cutting each [J], shape (n,)."""
     side: FloatArray
-    """On which side of the edge's line each strand passes: 1 or -1; 0 where that is not known."""
+    """On which side of the edge's line each fibre passes: 1 or -1; 0 where that is not known."""
     before: FloatArray
     """Point and other end before an increment [m], shape (n, 6)."""
     impulse: FloatArray
@@ -163,8 +163,8 @@ def add_attachment_forces(
         x = attached_point(attachments, p, positions)
         v = attached_point(attachments, p, velocities)
         begin, end = vec3(attachments.begin, p), vec3(attachments.end, p)
-        way = sub(lerp(when, begin, end), x)
-        pull = _pull(attachments, p, way, axpy(-dt, v, sub(end, begin)), dt)
+        path = sub(lerp(when, begin, end), x)
+        pull = _pull(attachments, p, path, axpy(-dt, v, sub(end, begin)), dt)
         seconds = share * dt
         count_impulse(attachments, p, x, scale(seconds, pull.force))
         attachments.work += share * dot(pull.force, sub(end, begin))
@@ -189,27 +189,27 @@ class _Pull(NamedTuple):
 
 
 @kernel
-def _pull(attachments: Attachments, p: int, way: Vec3, motion: Vec3, dt: float) -> _Pull:
+def _pull(attachments: Attachments, p: int, path: Vec3, motion: Vec3, dt: float) -> _Pull:
     """Return the force on point `p`, and what its damper takes.
 
     Args:
         attachments: Stiffness, damping and slack.
         p: The point.
-        way: From the point to what it is attached to [m].
+        path: Vector from the point to what it is attached to [m].
         motion: How far that moves ahead of the point in the time step [m].
         dt: Length of the time step [s].
     """
     stiffness, damping = attachments.stiffness[p], attachments.damping[p]
     if attachments.length[p] == 0.0 and attachments.section[p] == 0.0:
         drag = scale(damping / dt, motion)
-        return _Pull(add(scale(stiffness, way), drag), dot(drag, motion) / dt)
-    length = norm(way)
+        return _Pull(add(scale(stiffness, path), drag), dot(drag, motion) / dt)
+    length = norm(path)
     if length <= attachments.length[p]:
         return _Pull(Vec3(0.0, 0.0, 0.0), 0.0)
-    rate = dot(motion, way) / (length * dt)
+    rate = dot(motion, path) / (length * dt)
     tension = tension_of(attachments, p, length, rate)
     lost = (tension - stiffness * (length - attachments.length[p])) * rate
-    return _Pull(scale(tension / length, way), lost)
+    return _Pull(scale(tension / length, path), lost)
 
 
 @kernel
@@ -292,11 +292,11 @@ def _largest_rate(attachments: Attachments, each: FloatArray, masses: FloatArray
     return float((sums / masses[touched]).max())
 
 
-def strand_boxes(attachments: Attachments, positions: FloatArray) -> FloatArray:
-    """Return lowest and highest corner of each strand after a step [m], shape (n, 2, 3).
+def fibre_boxes(attachments: Attachments, positions: FloatArray) -> FloatArray:
+    """Return lowest and highest corner of each fibre after a step [m], shape (n, 2, 3).
 
     Args:
-        attachments: Of which those with a cross-section are strands.
+        attachments: Of which those with a cross-section are fibres.
         positions: Positions of the nodes [m].
     """
     rows = np.flatnonzero((attachments.section > 0.0) & (attachments.state != SEVERED))

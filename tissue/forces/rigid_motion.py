@@ -1,6 +1,6 @@
 """The rigid motion of loose pieces, which drag does not act on: a loose piece falls freely.
 
-Drag damps the slow modes of tissue, which dampers along edges hardly reach. It stands for what goes
+Drag damps the slow modes of tissue, which dampers along edges barely reach. It stands for what goes
 on within tissue, and so acts on the motion of a piece less its rigid part, that with the same
 momentum and the same angular momentum as the piece has. What is left has neither, so that drag
 changes neither. A piece that is held somewhere has no rigid motion.
@@ -107,7 +107,7 @@ def note_loose_positions(context: StepContext) -> None:
 def return_rigid_motion(context: StepContext, h: float) -> None:
     """Give loose pieces back what drag took from their rigid motion in a step of `h` [s].
 
-    It is drag times the way that the pieces went, which is the integral of their velocity.
+    It is drag times the path of the pieces, which is the integral of their velocity.
     """
     loose, body, stages, damping = context.loose, context.body, context.stages, context.damping
     given = 0.0

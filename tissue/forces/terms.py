@@ -38,7 +38,7 @@ from tissue.forces.attachments import (
     attached_energy,
     clear_attachment_forces,
 )
-from tissue.forces.fibres import add_caught_forces, slip_strands
+from tissue.forces.fibres import add_caught_forces, slip_fibres
 from tissue.forces.geom_reactions import add_geom_reactions
 from tissue.forces.step_context import Instant, StepContext
 from tissue.forces.supports import add_support_work, support_force
@@ -129,7 +129,7 @@ def end_substep(context: StepContext, edge: Edge, dt: float, share: float, when:
     end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
     if context.attachments.n_caught > 0:
-        slip_strands(context.attachments, body.positions, edge, when)
+        slip_fibres(context.attachments, body.positions, edge, when)
 
 
 @kernel

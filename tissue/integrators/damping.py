@@ -136,12 +136,12 @@ def end_damped_step(context: StepContext, before: float, h: float) -> None:
     body, stages = context.body, context.stages
     elastic, around = context.elastic, context.surroundings
     after = dissipated_power(body, elastic, around, body.positions, body.velocities, stages.change)
-    # Simpson's rule for the displacement gives the velocity half-way, of 4th order as the rest.
+    # Simpson's rule for the displacement gives the velocity half-moved, of 4th order as the rest.
     middle = stages.start_velocities
     for i in range(body.n_nodes):
-        way = point(body.positions, i) - point(stages.start_positions, i)
+        moved = point(body.positions, i) - point(stages.start_positions, i)
         ends = point(middle, i) + point(body.velocities, i)
-        store_point(middle, i, times(1.5 / h, way) - times(0.25, ends))
+        store_point(middle, i, times(1.5 / h, moved) - times(0.25, ends))
     half_way = dissipated_power(body, elastic, around, stages.positions, middle, stages.change)
     context.damping.dissipated += h / 6.0 * (before + 4.0 * half_way + after)
 

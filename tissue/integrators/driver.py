@@ -29,7 +29,7 @@ from tissue.integrators.damping import damp_if_due, relax_stress
 from tissue.integrators.methods import NYSTROEM, RUNGE_KUTTA
 from tissue.integrators.nystroem import nystroem_step
 from tissue.integrators.runge_kutta import runge_kutta_step
-from tissue.integrators.step_size import StepChoice, begin_increment, next_part, note_calm
+from tissue.integrators.step_size import StepChoice, begin_increment, next_part, note_rest
 from tissue.integrators.verlet import verlet_step
 from tissue.mesh.bounding_boxes import write_bounds
 
@@ -155,7 +155,7 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
         if choice.is_unstable == 1:
             return UNSTABLE
         if choice.done > 0:
-            note_calm(choice, step)
+            note_rest(choice, step)
             if relaxes(step.elastic.solid):
                 relax_stress(step, choice.span)
             if not write_bounds(step.body, relaxation.blade.bounds):

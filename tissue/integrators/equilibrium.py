@@ -1,7 +1,7 @@
-"""Equilibrium by dynamic relaxation with viscous damping that is found on the way.
+"""Equilibrium by dynamic relaxation with viscous damping that is found meanwhile.
 
 All nodes are damped as is critical for the slowest mode in which they still move. Its frequency is
-Rayleigh's quotient of the way of the last steps: masses times what the accelerations changed by on
+Rayleigh's quotient of the path of the last steps: masses times what the accelerations changed by on
 it. Sources: Day (1965) for the method; Papadrakakis (1981) and Underwood (1983) for the damping.
 """
 
@@ -32,12 +32,12 @@ ROUNDING = 10.0 * 2.0**-24
 """Part of a displacement that single precision makes of it, up to the force on a node. Measured 7
 times 2^-24 in the organ, where accelerations fall to 0.01 to 0.03 m/s2 and no further."""
 QUIET = 200
-"""Looks in a row at which accelerations are mere rounding, until the body counts as settled: 800
+"""Tests in a row at which accelerations are mere rounding, until the body counts as settled: 800
 steps, in which slow motion comes to rest below the rounding. The organ is then 0.2 um from where it
-would be at last."""
+would be in the end."""
 LONGEST_SETTLING = 20_000
 """Steps after which to give up waiting."""
-STEPS_BETWEEN_LOOKS = 4
+STEPS_BETWEEN_TESTS = 4
 """Steps between two evaluations of the forces, from which the damping follows. It acts after each
 step: after each fourth it would meet what turns round meanwhile always at one phase, and at that
 without velocity the motion would never end."""
@@ -50,7 +50,7 @@ FARTHEST_HELD = 10.0
 """How far a node may go, per diagonal of the box around the body: what goes farther is not held."""
 
 
-class Look(NamedTuple):
+class Motion(NamedTuple):
     """How a body moves after some steps."""
 
     accelerations: FloatArray
@@ -112,16 +112,16 @@ def _relax(
     body, n, rate = system.body, system.body.n_nodes, 0.0
     masses = body.masses[:n, None] * ~body.fixed[:n, None]
     watch, before = _Watch(system, support), np.zeros((n, 3))
-    for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_LOOKS):
+    for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_TESTS):
         positions_t0 = body.positions[:n].copy()
-        look = _take_steps(stepper, system, edge, rate)
-        way, change = body.positions[:n] - positions_t0, look.accelerations - before
+        motion = _take_steps(stepper, system, edge, rate)
+        moved, change = body.positions[:n] - positions_t0, motion.accelerations - before
         if done > 0:
-            rate = _frequency(masses, way, change)
-        before = look.accelerations
-        if watch.is_at_rest(look, done + STEPS_BETWEEN_LOOKS):
+            rate = _frequency(masses, moved, change)
+        before = motion.accelerations
+        if watch.is_at_rest(motion, done + STEPS_BETWEEN_TESTS):
             body.velocities[:n] = 0.0
-            return Settling(done + STEPS_BETWEEN_LOOKS, True, before)
+            return Settling(done + STEPS_BETWEEN_TESTS, True, before)
         if done == 0:
             _disturb(system)
     fastest = fastest_node(system, before)
@@ -132,7 +132,7 @@ def _relax(
 
 
 def _disturb(system: TissueModel) -> None:
-    """Move every free node a little, always in the same way.
+    """Move every free node a little, always by the same displacements.
 
     A symmetric body that is compressed from a symmetric start comes to a symmetric equilibrium, be
     it as unstable as a needle on its point: a block of springs between two plates stayed there with
@@ -140,11 +140,11 @@ def _disturb(system: TissueModel) -> None:
     """
     body, n = system.body, system.body.n_nodes
     free = ~body.fixed[:n]
-    ways = np.random.default_rng(0).uniform(-1.0, 1.0, (n, 3))
-    body.positions[:n][free] += DISTURBANCE * system.node_size * ways[free]
+    shifts = np.random.default_rng(0).uniform(-1.0, 1.0, (n, 3))
+    body.positions[:n][free] += DISTURBANCE * system.node_size * shifts[free]
 
 
-def _take_steps(stepper: GlobalStepper, system: TissueModel, edge: Edge, rate: float) -> Look:
+def _take_steps(stepper: GlobalStepper, system: TissueModel, edge: Edge, rate: float) -> Motion:
     """Take steps, each after its damping.
 
     Args:
@@ -160,34 +160,34 @@ def _take_steps(stepper: GlobalStepper, system: TissueModel, edge: Edge, rate: f
     added = contact.added_frequency_squared + system.added_by_attachments
     highest = max(at_rest, strained) + added
     step = stable_step(stepper.method.number, elasticity.arrays, highest, system.surroundings)
-    dt = STEPS_BETWEEN_LOOKS * step
+    dt = STEPS_BETWEEN_TESTS * step
     contact.begin()
     system.find_contacts(dt)
     system.find_geom_contacts(dt)
     velocities = system.body.velocities[:n]
-    for i in range(STEPS_BETWEEN_LOOKS):
+    for i in range(STEPS_BETWEEN_TESTS):
         velocities *= math.exp(-2.0 * rate * step)
         velocities_t0 = velocities.copy()
-        part = Increment(edge, dt, i / STEPS_BETWEEN_LOOKS, (i + 1) / STEPS_BETWEEN_LOOKS)
+        part = Increment(edge, dt, i / STEPS_BETWEEN_TESTS, (i + 1) / STEPS_BETWEEN_TESTS)
         stepper.take_steps(system, part, 1)
     system.relax_stress(math.inf)
     if contact.is_touching:  # what holds a body on the floor is not in its forces
-        return Look((velocities - velocities_t0) / step, highest)
+        return Motion((velocities - velocities_t0) / step, highest)
     found = system.stages.a1
     accelerations(system.context, found)
-    return Look(found[:n].copy(), highest)
+    return Motion(found[:n].copy(), highest)
 
 
-def _frequency(masses: FloatArray, way: FloatArray, change: FloatArray) -> float:
+def _frequency(masses: FloatArray, path: FloatArray, change: FloatArray) -> float:
     """Return the angular frequency of a motion by Rayleigh's quotient [1/s]; 0 where it softens.
 
     Args:
         masses: Of the nodes that are not fixed [kg], 0 for others; shape (n_nodes, 1).
-        way: How far the nodes moved [m], shape (n_nodes, 3).
+        path: How far the nodes moved [m], shape (n_nodes, 3).
         change: How their accelerations changed on it [m/s2], shape (n_nodes, 3).
     """
-    moved = float((masses * way**2).sum())
-    stiffness = -float((masses * way * change).sum())
+    moved = float((masses * path**2).sum())
+    stiffness = -float((masses * path * change).sum())
     return math.sqrt(stiffness / moved) if stiffness > 0.0 and moved > 0.0 else 0.0
 
 
@@ -205,22 +205,22 @@ class _Watch:
         self._farthest = FARTHEST_HELD * float(np.linalg.norm(np.ptp(self._begin, axis=0)))
         self._n_quiet = 0
 
-    def is_at_rest(self, look: Look, taken: int) -> bool:
+    def is_at_rest(self, motion: Motion, taken: int) -> bool:
         """Return whether the body is at rest.
 
         Args:
-            look: How it moves.
+            motion: How it moves.
             taken: Steps so far.
 
         Raises:
             TissueError: a node went too far, or where no number is.
         """
-        largest = float(np.abs(look.accelerations).max())
+        largest = float(np.abs(motion.accelerations).max())
         if not math.isfinite(largest):
             raise not_finite()
         if taken % STEPS_BETWEEN_CHECKS == 0:
             self._expect_near()
-        is_rounding = largest < self._rounding(look.frequency_squared)
+        is_rounding = largest < self._rounding(motion.frequency_squared)
         self._n_quiet = self._n_quiet + 1 if is_rounding else 0
         return largest < SETTLED or self._n_quiet == QUIET
 
@@ -245,7 +245,7 @@ class _Watch:
         Raises:
             TissueError: it is.
         """
-        ways = np.linalg.norm(self._positions - self._begin, axis=1)
-        node = int(ways.argmax())
-        if ways[node] > self._farthest:
+        distances = np.linalg.norm(self._positions - self._begin, axis=1)
+        node = int(distances.argmax())
+        if distances[node] > self._farthest:
             raise gone_too_far(self._system, node, self._begin[node], self._support)

@@ -79,7 +79,7 @@ class SupportConditions(NamedTuple):
 
     @property
     def remedy(self) -> str:
-        """Why the body gives way where that is its weight, else what may help."""
+        """Reason why the body yields, where that is its weight, else what may help."""
         if self.weight is not None:
             return self.weight.described
         return "less gravity, load or stretch, or a stiffer material, may help"
@@ -145,11 +145,11 @@ def gone_too_far(
         begin: Where it began [m], shape (3,).
         support: What the body should have come to rest on.
     """
-    way = float(np.linalg.norm(system.body.positions[node] - begin))
+    distance = float(np.linalg.norm(system.body.positions[node] - begin))
     x, y, z = begin
     found = (
         f"the body cannot come to rest: node {node}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, has gone "
-        f"{way:.3g} m and goes on."
+        f"{distance:.3g} m and goes on."
     )
     piece = _loose_piece(system, node)
     if not len(piece):

@@ -90,7 +90,7 @@ class GlobalStepper:
                 break
             if outcome == UNSTABLE:
                 raise UnstableError(
-                    f"it would take {choice.asked:.2g} steps of the integrator to go on, where "
+                    f"it would take {choice.needed:.2g} steps of the integrator to go on, where "
                     f"tissue at rest takes {math.ceil(choice.at_rest)}"
                 )
             if outcome == NOT_FINITE:
@@ -159,11 +159,11 @@ class GlobalStepper:
     def wake(self) -> None:
         """Move the body again, which may have been at rest."""
         if self._choice is not None:
-            self._choice.calm, self._choice.is_at_rest = 0.0, 0
+            self._choice.resting, self._choice.is_at_rest = 0.0, 0
 
     def let_rest(self, system: TissueModel) -> None:
         """Move a body that has settled only once something acts on it."""
-        self._choice_for(system).calm = TIME_TO_REST
+        self._choice_for(system).resting = TIME_TO_REST
 
     def body_moved(self, body: Body) -> None:
         """Forget the bound on the strained body: it is another one now."""

@@ -202,7 +202,7 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
         )
     if isinstance(choice, Verlet) and material.stiffens:
         raise ValueError(
-            f"relaxation verlet gains energy under law {material.law}: beside a blade elements get "
+            f"relaxation verlet gains energy under law {material.law}: near a blade elements get "
             "many times as stiff from one step to the next. Choose relaxation global, which does "
             "not, or law neo_hookean"
         )

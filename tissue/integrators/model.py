@@ -22,8 +22,8 @@ from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
-from tissue.forces.attachments import Attachments, no_attachments, strand_boxes
-from tissue.forces.fibres import report_strands
+from tissue.forces.attachments import Attachments, fibre_boxes, no_attachments
+from tissue.forces.fibres import report_fibres
 from tissue.forces.step_context import Damping, StepContext, new_stages, supports_at_rest
 from tissue.integrators.stability import damping_rate, stable_step
 from tissue.material import Material
@@ -109,8 +109,8 @@ class TissueModel:
         """Whether fixed nodes move, and their work."""
         self.attachments = no_attachments()
         """Points that are tied to what moves from outside."""
-        self.has_strands = False
-        """Whether any of them is a strand, which the blade can cut."""
+        self.has_fibres = False
+        """Whether any of them is a fibre, which the blade can cut."""
         self.added_by_attachments = 0.0
         """What they add to w^2 of the body at most [1/s2]."""
         self.geoms = no_geoms(body, self.node_size)
@@ -231,16 +231,16 @@ class TissueModel:
             self.renew_context()
 
     def take_attachments(
-        self, attachments: Attachments, has_strands: bool, added_frequency_squared: float
+        self, attachments: Attachments, has_fibres: bool, added_frequency_squared: float
     ) -> None:
         """Take points that are tied to what moves from outside.
 
         Args:
             attachments: Their arrays.
-            has_strands: Whether any is a strand, which the blade can cut.
+            has_fibres: Whether any is a fibre, which the blade can cut.
             added_frequency_squared: What they add to w^2 of the body at most [1/s2].
         """
-        self.attachments, self.has_strands = attachments, has_strands
+        self.attachments, self.has_fibres = attachments, has_fibres
         self.added_by_attachments = added_frequency_squared
         self.renew_context()
 
@@ -281,7 +281,7 @@ class TissueModel:
             self._increments_to_pieces = INCREMENTS_TO_PIECES
 
     def incision_ended(self) -> None:
-        """Update what is looked at once the blade has left an incision."""
+        """Update what is tested once the blade has left an incision."""
         self.elasticity.return_mass(self.body)
         self.contact.incision_ended(self.body)
         self.find_loose_pieces()
@@ -294,14 +294,14 @@ class TissueModel:
         self.touched = np.zeros(n_nodes, dtype=np.int64)
 
     def report(self, blade: BladeContext, edge: Edge, dt: float) -> BladeReport:
-        """Return what a time step of `dt` [s] came to for the blade; bounds hold strands too."""
-        if not self.has_strands:
+        """Return what a time step of `dt` [s] came to for the blade; bounds hold fibres too."""
+        if not self.has_fibres:
             return self.interaction.report(blade, edge, dt)
-        strands, positions = self.attachments, self.body.positions
+        fibres, positions = self.attachments, self.body.positions
         found = self.interaction.report(
-            blade, edge, dt, lambda report: report_strands(report, strands, positions, edge)
+            blade, edge, dt, lambda report: report_fibres(report, fibres, positions, edge)
         )
-        boxes = strand_boxes(strands, positions)
+        boxes = fibre_boxes(fibres, positions)
         low = boxes[:, 0].min(axis=0, initial=math.inf)
         high = boxes[:, 1].max(axis=0, initial=-math.inf)
         bounds = (np.minimum(found.bounds[0], low), np.maximum(found.bounds[1], high))

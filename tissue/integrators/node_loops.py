@@ -90,7 +90,7 @@ def take_part(context: StepContext, longest_spin: int) -> int:
 
     Args:
         context: What takes part, the same struct as the other thread's.
-        longest_spin: Times to look for a chunk in vain before it returns.
+        longest_spin: Searches for a chunk in vain before it returns.
     """
     team, spins, n_chunks = context.team, 0, 0
     while spins < longest_spin:

@@ -1,4 +1,4 @@
-"""Rest: a body that has been calm for a while, and that nothing touches, is not moved.
+"""Rest: a body that has barely moved for a while, and that nothing touches, is not moved.
 
 Until then it takes its steps. It is moved again from the time step in which a blade touches it, a
 support moves, a load acts or its mesh changes.
@@ -16,28 +16,29 @@ from tissue.forces.step_context import StepContext
 from tissue.forces.terms import leave_at_rest
 from tissue.mesh.body import Body
 
-CALM_SPEED = 0.01
-"""Speed up to which a body is calm, the root of the mean square of its nodes weighted with their
-masses, in node sizes per second: 47 um/s in the organ. Larger: a slow motion of the body stops
-short of its end. Smaller, or the speed of the fastest node instead: a sliver of some milligrams
-that swings by micrometres after many cuts keeps the body from rest for seconds."""
+RESTING_SPEED = 0.01
+"""Speed up to which a body is nearly at rest, the root of the mean square of its nodes weighted
+with their masses, in node sizes per second: 47 um/s in the organ. Larger: a slow motion of the body
+stops short of its end. Smaller, or the speed of the fastest node instead: a sliver of some
+milligrams that swings by micrometres after many cuts keeps the body from rest for seconds."""
 
-CALM_FASTEST = 4.0
-"""Speed of the fastest node up to which a body is calm, in node sizes per second: 0.02 m/s in the
-organ. Larger: a sliver that snaps is stopped; smaller: as above."""
+RESTING_FASTEST = 4.0
+"""Speed of the fastest node up to which a body is nearly at rest, in node sizes per second: 0.02
+m/s in the organ. Larger: a sliver that snaps is stopped; smaller: as above."""
 
-CALM_WAY = 0.003
-"""How far a node may move while a body is calm, per node size: 14 um in the organ. Larger: what
-creeps stops short of its end; smaller: as above."""
+RESTING_MOTION = 0.003
+"""Distance that a node may move while a body is nearly at rest, per node size: 14 um in the organ.
+Larger: what creeps stops short of its end; smaller: as above."""
 
 TIME_TO_REST = 0.25
-"""How long a body is calm until it is at rest [s]. Shorter: a swing of some micrometres, which is
-slow at its turning points, stops there, and a sag stops 40 nm short of its end."""
+"""Time for which a body is nearly at rest until it is at rest [s]. Shorter: a swing of some
+micrometres, which is slow at its turning points, stops there, and a sag stops 40 nm short of its
+end."""
 
 
 @kernel
 def may_rest(context: StepContext, drag: float) -> bool:
-    """Return whether nothing acts that would move a calm body.
+    """Return whether nothing acts that would move a body that is nearly at rest.
 
     Without drag nothing comes to rest. Stress that relaxes moves a body slowly for a long time.
 
@@ -65,13 +66,13 @@ def keep_positions(body: Body, kept: FloatArray) -> None:
 
 
 @kernel
-def have_stayed(body: Body, kept: FloatArray, way: float) -> bool:
-    """Return whether no node is farther than `way` [m] from where it was kept."""
+def have_stayed(body: Body, kept: FloatArray, distance: float) -> bool:
+    """Return whether no node is farther than `distance` [m] from where it was kept."""
     furthest = 0.0
     for i in range(body.n_nodes):
         moved = sub(vec3(body.positions, i), vec3(kept, i))
         furthest = max(furthest, dot(moved, moved))
-    return bool(furthest <= way * way)
+    return bool(furthest <= distance * distance)
 
 
 @kernel

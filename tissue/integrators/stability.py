@@ -74,7 +74,7 @@ def _stage_damped_step(
     """Return a stable Runge-Kutta step [s] where damping acts in every stage.
 
     Dampers along edges brake a mode by retardation_time times their own w^2, and not by that of
-    tetrahedra, which is several times as high where tissue hardly changes its volume. What is
+    tetrahedra, which is several times as high where tissue barely changes its volume. What is
     braked as much at a lower frequency is stable too, within `SAFETY`: over the damping ratios
     from 0.5 on, braking times the largest step is 2.6 to 2.8 (`STABILITY_LIMIT`).
     """

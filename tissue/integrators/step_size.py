@@ -1,7 +1,7 @@
 """Into how many steps an increment is divided: as many as stability needs, and not more.
 
 Where stiffness depends on how far the body is strained, an increment is divided into parts of
-two steps, and the number of steps is chosen anew for each part.
+two steps, and the number of steps is chosen for each part.
 """
 
 import math
@@ -29,9 +29,9 @@ from tissue.integrators.node_loops import (
     run_loop,
 )
 from tissue.integrators.resting import (
-    CALM_FASTEST,
-    CALM_SPEED,
-    CALM_WAY,
+    RESTING_FASTEST,
+    RESTING_MOTION,
+    RESTING_SPEED,
     TIME_TO_REST,
     have_stayed,
     keep_positions,
@@ -50,7 +50,7 @@ MOTION_BETWEEN_STRAIN_BOUNDS: Final = 0.001
 """How far a node may move from one bound to the next where there are more steps between them, as a
 share of the node size: some percent of the least altitude of slivers. With 0.01 slivers of the
 organ went on trembling at 0.06 m/s a second after ten strokes; with this they are at rest. A bound
-takes as long as half a step: without this a body at rest would be looked at as often as one that
+takes as long as half a step: without this a body at rest would be evaluated as often as one that
 swings."""
 
 _SAME_LIMIT = 1e-6
@@ -91,7 +91,7 @@ class StepChoice(Arrays):
     refinement: IntCell
     """How many times as many steps are taken as motion and stability ask for."""
     is_at_rest: IntCell
-    """1 while the body is not moved, as it has been calm and nothing touches it, else 0."""
+    """1 while the body is not moved, as it was nearly at rest and nothing touches it, else 0."""
     is_unstable: IntCell
     """1 if the motion became unstable: it would take too many steps: see `MOST_STEPS`."""
     dt: FloatCell
@@ -112,8 +112,8 @@ class StepChoice(Arrays):
     """Bound on w^2 with the body at rest, the blade and contact [1/s2]."""
     added: FloatCell
     """What contact adds to w^2, and the blade where tissue stiffens [1/s2]."""
-    asked: FloatCell
-    """Steps that the motion asks for in the rest of the increment."""
+    needed: FloatCell
+    """Steps that the motion needs in the rest of the increment."""
     at_rest: FloatCell
     """Steps that the body at rest would take for it."""
     strained: FloatCell
@@ -122,10 +122,10 @@ class StepChoice(Arrays):
     """Up to which w^2 it was not brought near the truth [1/s2]."""
     moved: FloatCell
     """How far nodes have moved since, at most [m]."""
-    calm: FloatCell
-    """How long the body has been calm, and nothing has touched it [s]."""
-    calm_positions: FloatArray
-    """Where the nodes were when the body became calm [m], shape (n_nodes, 3)."""
+    resting: FloatCell
+    """How long the body has been nearly at rest, and nothing has touched it [s]."""
+    resting_positions: FloatArray
+    """Where the nodes were when that began [m], shape (n_nodes, 3)."""
     speed: FloatCell
     """Speed of the fastest node at the begin of the part [m/s]."""
     node_size: float
@@ -156,13 +156,13 @@ def new_step_choice(
         of_contact=0.0,
         least=0.0,
         added=0.0,
-        asked=0.0,
+        needed=0.0,
         at_rest=0.0,
         strained=0.0,
         allowed=0.0,
         moved=math.inf,
-        calm=0.0,
-        calm_positions=np.zeros((n_nodes, 3)),
+        resting=0.0,
+        resting_positions=np.zeros((n_nodes, 3)),
         speed=0.0,
         node_size=node_size,
         surroundings=surroundings,
@@ -222,26 +222,26 @@ def begin_increment(
 def _find_rest(choice: StepChoice, context: StepContext) -> None:
     """Find out whether the body is at rest."""
     if not may_rest(context, choice.surroundings.drag):
-        choice.calm = 0.0
-    choice.is_at_rest = 1 if choice.calm >= TIME_TO_REST else 0
+        choice.resting = 0.0
+    choice.is_at_rest = 1 if choice.resting >= TIME_TO_REST else 0
 
 
 @kernel
-def note_calm(choice: StepChoice, context: StepContext) -> None:
-    """Note, after the steps of an increment, whether the body was calm; stop what comes to rest."""
+def note_rest(choice: StepChoice, context: StepContext) -> None:
+    """Note, after an increment, whether the body was nearly at rest; stop it once it is at rest."""
     body, size = context.body, choice.node_size
     is_free = may_rest(context, choice.surroundings.drag)
-    is_slow = is_free and choice.speed <= CALM_FASTEST * size
-    if not is_slow or mean_speed(body) > CALM_SPEED * size:
-        choice.calm = 0.0
-    elif choice.calm == 0.0:
-        keep_positions(body, choice.calm_positions)
-        choice.calm = choice.span
-    elif have_stayed(body, choice.calm_positions, CALM_WAY * size):
-        choice.calm += choice.span
+    is_slow = is_free and choice.speed <= RESTING_FASTEST * size
+    if not is_slow or mean_speed(body) > RESTING_SPEED * size:
+        choice.resting = 0.0
+    elif choice.resting == 0.0:
+        keep_positions(body, choice.resting_positions)
+        choice.resting = choice.span
+    elif have_stayed(body, choice.resting_positions, RESTING_MOTION * size):
+        choice.resting += choice.span
     else:
-        choice.calm = 0.0
-    if choice.calm >= TIME_TO_REST:
+        choice.resting = 0.0
+    if choice.resting >= TIME_TO_REST:
         stop_nodes(context)
 
 
@@ -260,13 +260,13 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
     n, highest = _without_another_step(choice.least, longest, span)
     _note_motion(choice, context)
     step = _strained_step(choice, context, StepLimit(highest - choice.added, choice.added, n))
-    choice.asked = max(span / step, choice.speed * span / choice.node_size / LONGEST_MOTION)
+    choice.needed = max(span / step, choice.speed * span / choice.node_size / LONGEST_MOTION)
     choice.at_rest = max(span / longest, 1.0)
     # A comparison with nan is false.
-    if not choice.asked <= max(MOST_STEPS, MOST_OF_LONG * choice.at_rest):
+    if not choice.needed <= max(MOST_STEPS, MOST_OF_LONG * choice.at_rest):
         choice.is_unstable = 1
         return False
-    n = max(1, math.ceil(choice.refinement * choice.asked))
+    n = max(1, math.ceil(choice.refinement * choice.needed))
     now, interval = damping_rate(elastic, surroundings), LONGEST_INTERVAL * span / n
     accurate = now if _FOLLOWS_SLIVERS[choice.method] else context.damping.rate_uncut
     is_slow = accurate * interval <= SLOW_DAMPING and now * interval <= FASTEST_DECAY
@@ -291,7 +291,7 @@ def _note_motion(choice: StepChoice, context: StepContext) -> None:
 
 @kernel
 def _limit_mass(choice: StepChoice, context: StepContext) -> None:
-    """Let nodes get no mass between cuts where one step suffices for the increment without it."""
+    """Add no mass to nodes between cuts where one step suffices for the increment without it."""
     elastic, scaling = context.elastic, context.elastic.scaling
     at_rest = elastic.highest + choice.of_contact
     longest = stable_step(choice.method, elastic, at_rest, choice.surroundings)
@@ -323,7 +323,7 @@ def _strained_step(choice: StepChoice, context: StepContext, limit: StepLimit) -
     Args:
         choice: What the steps depend on.
         context: Body and forces.
-        limit: The strained body is looked at no closer than the number of steps asks for.
+        limit: The strained body is evaluated no closer than the number of steps needs.
     """
     elastic, strained = context.elastic, 0.0
     elastic.solid.are_gradients_known = 0

@@ -1,8 +1,8 @@
 """Threads that take part in the loops of a body's steps (`tissue.integrators.node_loops`).
 
 The bits are those of one thread, and the thread that steps the body never waits for another to
-begin (`tissue.core.thread_team`). The others look for loops, and sleep where none comes for longer
-than a time step.
+begin (`tissue.core.thread_team`). The others search for loops, and sleep where none comes for
+longer than a time step.
 """
 
 import threading
@@ -14,7 +14,7 @@ from tissue.forces.step_context import StepContext
 from tissue.integrators.node_loops import take_part
 
 LONGEST_SPIN = 20_000
-"""Times that a thread looks for a loop before it sleeps: about 1 ms at some 50 ns. To wake it takes
+"""Searches of a thread for a loop before it sleeps: about 1 ms at some 50 ns. To wake it takes
 50 to 90 us of a time step, so that it should not sleep between two steps of 1 ms. It does not leave
 its core to others in between: where they are busy it came too late to nearly all loops then."""
 
@@ -40,7 +40,7 @@ class Threads:
         weakref.finalize(self, _end_all, self._workers)
 
     def join(self, context: StepContext) -> None:
-        """Let all threads take part in the loops of this context from now on."""
+        """Share the loops of this context with all threads from now on."""
         context.team.is_shared = 1
         for worker in self._workers:
             worker.wake(context)
@@ -56,14 +56,14 @@ class _Worker:
         self._skipped = self._to_skip = 0
 
     def wake(self, context: StepContext) -> None:
-        """Let the thread look for loops of this context, unless it is still looking for others."""
+        """Wake the thread for loops of this context, unless it still searches for others."""
         if not self._is_asleep:
             return
         if self._to_skip > 0:
             self._to_skip -= 1
             return
         if self._thread is None:
-            take_part(context, 0)  # compiles it here, not beside what is compiled next
+            take_part(context, 0)  # compiles it here, not at the time of what is compiled next
             self._thread = threading.Thread(target=self._work, name="tissue", daemon=True)
             self._thread.start()
         self._is_asleep = False

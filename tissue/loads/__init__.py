@@ -3,6 +3,6 @@
 material_points    points of the material, which survive cuts
 attachment         springs to a frame that is moved from outside
 load               a force on such points, and all loads of a body
-ligament           strands to the world, which the blade can cut
+ligament           fibres to the world, which the blade can cut
 handles            loads, attachments, geoms and supports of one body, step by step
 """

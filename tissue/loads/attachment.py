@@ -58,7 +58,7 @@ class Attachment:
         )
         """Length up to which each point is slack [m], shape (n,)."""
         self.sections: FloatArray = np.zeros(len(points))
-        """Cross-section of each, where it is a strand that the blade can cut [m2], shape (n,)."""
+        """Cross-section of each, where it is a fibre that the blade can cut [m2], shape (n,)."""
         self.toughness = 0.0
         """Energy of cutting them [J/m2]."""
         self.is_released = False

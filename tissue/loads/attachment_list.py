@@ -9,8 +9,8 @@ from tissue.forces.attachments import (
     frequency_squared,
     no_attachments,
 )
-from tissue.forces.fibre_crossing import catch_strands, note_strands
-from tissue.forces.fibres import free_strands, write_stiffening
+from tissue.forces.fibre_crossing import catch_fibres, note_fibres
+from tissue.forces.fibres import free_fibres, write_stiffening
 from tissue.forces.step_context import Increment
 from tissue.loads.attachment import Attachment
 from tissue.mesh.body import Body
@@ -38,8 +38,8 @@ class AttachmentList:
         self.added_frequency_squared = 0.0
         """What they add to w^2 of the body at most [1/s2]."""
         self._edge_length = 0.0
-        self.has_strands = False
-        """Whether any is a strand that the blade can cut."""
+        self.has_fibres = False
+        """Whether any is a fibre that the blade can cut."""
         self._had_caught = False
 
     @property
@@ -48,8 +48,8 @@ class AttachmentList:
         return tuple(self._attachments)
 
     @property
-    def n_strands(self) -> int:
-        """Number of strands that the blade may hold."""
+    def n_fibres(self) -> int:
+        """Number of fibres that the blade may hold."""
         return int((self.arrays.section > 0.0).sum())
 
     @property
@@ -111,23 +111,23 @@ class AttachmentList:
     def begin_increment(self, body: Body, increment: Increment, has_blade: bool) -> None:
         """Hold what the blade, which may be gone or another, has caught."""
         self.arrays.work = 0.0
-        if not self.has_strands:
+        if not self.has_fibres:
             return
         edge = increment.edge
         if not (has_blade and abs(edge.length - self._edge_length) <= _SAME * edge.length):
             self._free(body)
         self._edge_length = edge.length if has_blade else 0.0
-        note_strands(self.arrays, body.positions, increment.begin)
+        note_fibres(self.arrays, body.positions, increment.begin)
         has_caught = self.arrays.n_caught > 0
         if has_caught or self._had_caught:
             self._bound(body, edge.travel * (increment.end - increment.begin))
         self._had_caught = has_caught
 
     def end_increment(self, body: Body, increment: Increment) -> None:
-        """Catch the strands that the blade has met."""
-        if self.has_strands and self._edge_length > 0.0:
+        """Catch the fibres that the blade has met."""
+        if self.has_fibres and self._edge_length > 0.0:
             _, _, begin, end = increment
-            catch_strands(self.arrays, body.positions, increment.edge, begin, end)
+            catch_fibres(self.arrays, body.positions, increment.edge, begin, end)
 
     def locate(self, body: Body) -> None:
         """Find the points in the mesh, which a cut has changed."""
@@ -177,8 +177,8 @@ class AttachmentList:
         self._renew(body, kept)
 
     def _free(self, body: Body) -> None:
-        """Take the blade away from all strands."""
-        free_strands(self.arrays, body.positions)
+        """Take the blade away from all fibres."""
+        free_fibres(self.arrays, body.positions)
 
     def _renew(self, body: Body, kept: list[int]) -> None:
         """Make arrays for the attachments that there are; the first are at rows of the old ones."""
@@ -198,6 +198,6 @@ class AttachmentList:
             self.arrays.section[rows] = each.sections
             self.arrays.toughness[rows] = each.toughness
             row += n
-        self.has_strands = bool(self.arrays.section.any())
+        self.has_fibres = bool(self.arrays.section.any())
         self._write_targets()
         self.locate(body)

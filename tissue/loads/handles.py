@@ -84,7 +84,7 @@ class Handles:
         model, attachments = self._model, self.attachments
         attachments.add(attachment, model.body)
         self._hand_over()
-        model.interaction.make_room_for_strands(attachments.n_strands)
+        model.interaction.make_room_for_fibres(attachments.n_fibres)
         return attachment
 
     def release(self, held: Load | Attachment) -> None:
@@ -237,7 +237,7 @@ class Handles:
     def _hand_over(self) -> None:
         """Hand the arrays of the attachments over to the model, on which the integrator works."""
         held = self.attachments
-        self._model.take_attachments(held.arrays, held.has_strands, held.added_frequency_squared)
+        self._model.take_attachments(held.arrays, held.has_fibres, held.added_frequency_squared)
 
 
 def _supports_at(body: Body, where: str | npt.ArrayLike) -> IntArray:

@@ -1,4 +1,4 @@
-"""Ligaments: strands between tissue and the world, which the blade can cut."""
+"""Ligaments: fibres between tissue and the world, which the blade can cut."""
 
 import math
 
@@ -12,17 +12,17 @@ from tissue.loads.material_points import MaterialPoints
 
 
 class Ligament(Attachment):
-    """Strands from points of a tissue to other places: each pulls where it is taut.
+    """Fibres from points of a tissue to other places: each pulls where it is taut.
 
-    The edge of the blade bends the strands that it sweeps across, and cuts them
+    The edge of the blade bends the fibres that it sweeps across, and cuts them
     (`tissue.forces.fibres`). The other ends are fixed to a frame: the world, until `move`.
 
     Args:
         points: The points of the tissue, each with its share of stiffness and cross-section.
-        others: Where the strands end [m], shape (n, 3).
+        others: Where the fibres end [m], shape (n, 3).
         lengths: Length up to which each is slack [m], shape (n,).
-        stiffness: Of all strands together, along them [N/m].
-        area: Cross-section of all strands together [m2].
+        stiffness: Of all fibres together, along them [N/m].
+        area: Cross-section of all fibres together [m2].
         toughness: Energy of cutting them [J/m2].
         damping: Of all of them together, along them [N s/m].
         breaks_at: Force of all of them at which they release the tissue [N].
@@ -53,10 +53,10 @@ class Ligament(Attachment):
         self.toughness = float(toughness)
 
 
-def ends_of_strands(
+def ends_of_fibres(
     positions: FloatArray, to: npt.ArrayLike, rest_length: float | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where strands end [m], shape (n, 3), and up to which length each is slack [m], (n,).
+    """Return where fibres end [m], shape (n, 3), and up to which length each is slack [m], (n,).
 
     Args:
         positions: Where they begin [m], shape (n, 3).

@@ -17,7 +17,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
 from tissue.cutting.incision import CutHooks, Incision
-from tissue.forces.attachments import strand_boxes
+from tissue.forces.attachments import fibre_boxes
 from tissue.forces.step_context import Increment
 from tissue.integrators.equilibrium import SETTLED, settle
 from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
@@ -229,9 +229,9 @@ class StepStages:
         one pass over the nodes.
         """
         model, found = self.model, self.chunks.boxes(self.model.body)
-        if not model.has_strands:
+        if not model.has_fibres:
             return found
-        boxes = strand_boxes(model.attachments, model.body.positions)
+        boxes = fibre_boxes(model.attachments, model.body.positions)
         return found._replace(boxes=np.concatenate((found.boxes, boxes))) if len(boxes) else found
 
     def cut_report(self, solver: SolverSettings) -> CutReport:

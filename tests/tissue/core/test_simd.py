@@ -22,7 +22,7 @@ from tissue.core.simd import (
     unfused,
 )
 from tissue.forces.step_context import Stages
-from tissue.integrators.bielser_1998.kernels import new_trails
+from tissue.integrators.bielser_1998.kernels import new_local_clocks
 from tissue.mesh.body import grown
 
 pytestmark = pytest.mark.kernel
@@ -96,7 +96,7 @@ def test_all_arrays_whose_rows_are_gathered_have_padding_after_the_last():
         solver=SolverSettings(relaxation="hierarchical"),
     )
     body, stages = tissue._body, tissue._model.stages
-    arrays = [body.rest, body.positions, body.velocities, new_trails(5).origins]
+    arrays = [body.rest, body.positions, body.velocities, new_local_clocks(5).origins]
     arrays += [getattr(stages, name) for name in Stages.__annotations__]
     arrays += [room_for_points(7), grown(room_for_points(7), 9)]
     for array in arrays:

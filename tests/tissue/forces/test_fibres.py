@@ -1,4 +1,4 @@
-"""Strands on the edge of the blade: what it sweeps across, and the force on the bend."""
+"""Fibres on the edge of the blade: what it sweeps across, and the force on the bend."""
 
 from itertools import pairwise
 
@@ -8,16 +8,16 @@ import pytest
 from tissue.blade.edge import Edge
 from tissue.core.vec3 import Vec3
 from tissue.forces.attachments import CAUGHT, SEVERED, STRAIGHT, holding_energy, no_attachments
-from tissue.forces.fibre_crossing import catch_strands, note_strands
-from tissue.forces.fibres import force_at, slip_strands
+from tissue.forces.fibre_crossing import catch_fibres, note_fibres
+from tissue.forces.fibres import force_at, slip_fibres
 
 pytestmark = pytest.mark.kernel
 
 POSITIONS = np.array([[0.0, 0.0, -1.0]] + [[9.0, 9.0, 9.0]] * 3)
-"""The strand goes from its first node, (0, 0, -1), to (0, 0, 1)."""
+"""The fibre goes from its first node, (0, 0, -1), to (0, 0, 1)."""
 
 
-def strand(**fields):
+def fibre(**fields):
     found = no_attachments(1)
     found.nodes[0], found.weights[0] = range(4), (1.0, 0.0, 0.0, 0.0)
     found.begin[0] = found.end[0] = (0.0, 0.0, 1.0)
@@ -34,15 +34,15 @@ def edge(y0, y1, *, x=(-1.0, 1.0), z=0.0, forward=1.0, lift=0.0):
     return Edge(ends[0][0], ends[1][0], ahead, ends[0][1], ends[1][1], ahead)
 
 
-def swept(strands, *edges):
+def swept(fibres, *edges):
     for each in edges:
-        note_strands(strands, POSITIONS, 0.0)
-        catch_strands(strands, POSITIONS, each, 0.0, 1.0)
-    return strands
+        note_fibres(fibres, POSITIONS, 0.0)
+        catch_fibres(fibres, POSITIONS, each, 0.0, 1.0)
+    return fibres
 
 
-def test_an_edge_that_sweeps_across_a_strand_catches_it_where_it_passes():
-    found = swept(strand(), edge(-0.1, 0.3, x=(-0.25, 0.75), z=0.5))
+def test_an_edge_that_sweeps_across_a_fibre_catches_it_where_it_passes():
+    found = swept(fibre(), edge(-0.1, 0.3, x=(-0.25, 0.75), z=0.5))
     assert found.state[0] == CAUGHT and found.n_caught == 1
     np.testing.assert_allclose(found.place[0], [0.25, 0.3])  # from the tip; the edge is ahead
     np.testing.assert_allclose(found.bend[0], [0.0, 0.0, 0.5])
@@ -62,15 +62,15 @@ def test_an_edge_that_sweeps_across_a_strand_catches_it_where_it_passes():
     ids=["tip", "heel", "above", "below", "back", "along it"],
 )
 def test_an_edge_that_passes_beside_it_does_not(beside):
-    assert swept(strand(), edge(-0.1, 0.3, **beside)).state[0] == STRAIGHT
+    assert swept(fibre(), edge(-0.1, 0.3, **beside)).state[0] == STRAIGHT
 
 
 def test_a_crossing_that_two_increments_share_is_found_once():
-    """The edge stops on the strand: touching counts as one of the sides, in both increments."""
+    """The edge stops on the fibre: touching counts as one of the sides, in both increments."""
     for parts in ([-0.1, 0.0, 0.1], [0.1, 0.0, -0.1]):
         ahead = 1.0 if parts[0] < 0 else -1.0
         states = []
-        found = strand()
+        found = fibre()
         for y0, y1 in pairwise(parts):
             swept(found, edge(y0, y1, forward=ahead))
             states.append(found.state[0])
@@ -79,18 +79,18 @@ def test_a_crossing_that_two_increments_share_is_found_once():
 
 def test_an_edge_without_motion_catches_nothing():
     for y in (-0.1, 0.0, 0.1):
-        assert swept(strand(), edge(y, y)).state[0] == STRAIGHT
+        assert swept(fibre(), edge(y, y)).state[0] == STRAIGHT
 
 
-def test_a_strand_that_moves_onto_an_edge_at_rest_is_caught():
-    found = strand()
+def test_a_fibre_that_moves_onto_an_edge_at_rest_is_caught():
+    found = fibre()
     found.before[0] = (0.0, 0.1, -1.0, 0.0, 0.1, 1.0)
-    catch_strands(found, POSITIONS, edge(0.05, 0.05), 0.0, 1.0)
+    catch_fibres(found, POSITIONS, edge(0.05, 0.05), 0.0, 1.0)
     assert found.state[0] == CAUGHT
 
 
 def test_the_force_on_the_bend_is_the_slope_of_the_energy():
-    found, step, random = strand(), 1e-6, np.random.default_rng(0)
+    found, step, random = fibre(), 1e-6, np.random.default_rng(0)
     x, end = Vec3(0.0, 0.0, -1.0), Vec3(0.0, 0.0, 1.0)
 
     def energy(bend):
@@ -108,11 +108,11 @@ def test_the_force_on_the_bend_is_the_slope_of_the_energy():
 
 def test_a_slip_spends_the_energy_that_the_string_loses_and_leaves_the_resistance():
     """Section 0.01 m2 is 0.113 m across: the edge goes in at 50 * 0.01 / 0.113 = 4.43 N."""
-    found = swept(strand(), edge(-0.1, 0.0), edge(0.0, 1e-9))
+    found = swept(fibre(), edge(-0.1, 0.0), edge(0.0, 1e-9))
     x, end = Vec3(0.0, 0.0, -1.0), Vec3(0.0, 0.0, 1.0)
     there = edge(0.0, 0.75)
     before = holding_energy(found, 0, 2.0 * np.hypot(1.0, 0.75 - found.place[0, 1]))
-    slip_strands(found, POSITIONS, there, 1.0)
+    slip_fibres(found, POSITIONS, there, 1.0)
     after = holding_energy(found, 0, 2.0 * np.hypot(1.0, found.bend[0, 1]))
     assert found.state[0] == CAUGHT
     assert found.severing == pytest.approx(before - after) and before > after
@@ -120,10 +120,10 @@ def test_a_slip_spends_the_energy_that_the_string_loses_and_leaves_the_resistanc
     np.testing.assert_allclose(force, [0.0, -0.5 / np.sqrt(0.04 / np.pi), 0.0], atol=1e-9)
 
 
-def test_a_strand_is_severed_for_just_its_energy():
-    found = swept(strand(), edge(-0.1, 0.0), edge(0.0, 1e-9))
+def test_a_fibre_is_severed_for_just_its_energy():
+    found = swept(fibre(), edge(-0.1, 0.0), edge(0.0, 1e-9))
     before = holding_energy(found, 0, 2.0 * np.hypot(1.0, 2.0))
-    slip_strands(found, POSITIONS, edge(0.0, 2.0), 1.0)
+    slip_fibres(found, POSITIONS, edge(0.0, 2.0), 1.0)
     assert found.state[0] == SEVERED and found.n_caught == 0
     assert found.severing == 0.5
     assert found.released == pytest.approx(before - 0.5)

@@ -10,11 +10,11 @@ from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.integrators.bielser_1998.kernels import (
     FrameTimes,
-    Trails,
+    LocalClocks,
     hierarchical_frame,
-    new_trails,
+    new_local_clocks,
 )
-from tissue.integrators.bielser_1998.node_rings import (
+from tissue.integrators.bielser_1998.rings import (
     Rings,
     add_focus,
     begin_search,
@@ -69,7 +69,7 @@ def hierarchical_frames(
     updates: int,
     last_ring: int,
     frozen: bool,
-    trails: Trails | None = None,
+    local_clocks: LocalClocks | None = None,
 ) -> None:
     """Advance by frames of the hierarchical relaxation.
 
@@ -81,16 +81,16 @@ def hierarchical_frames(
         updates: Steps of ring 0 in a frame.
         last_ring: Last ring that takes steps of its own.
         frozen: Whether nodes beyond the last ring do not move.
-        trails: Scratch of the kernels, made if not given.
+        local_clocks: Scratch of the kernels, made if not given.
     """
     n_nodes = len(network.body.rest)
     rings = rings_around(network, focus, last_ring + 1)
-    trails = trails or new_trails(n_nodes)
+    local_clocks = local_clocks or new_local_clocks(n_nodes)
     n_micro, every = ring_steps(Hierarchical(updates, last_ring), [0.0] * (last_ring + 2))
     frame = FrameTimes(span, 0.0, 1.0, n_micro, last_ring, frozen)
     context = network.context
     for _ in range(n):
-        hierarchical_frame(context, NOWHERE, rings, trails, every, frame)
+        hierarchical_frame(context, NOWHERE, rings, local_clocks, every, frame)
 
 
 def frequency_bound(network: Network) -> float:

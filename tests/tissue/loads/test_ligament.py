@@ -1,4 +1,4 @@
-"""Ligaments: strands between tissue and world that the edge of the blade bends and cuts."""
+"""Ligaments: fibres between tissue and world that the edge of the blade bends and cuts."""
 
 from itertools import pairwise
 
@@ -22,7 +22,7 @@ GEL = Material(
 CUBE = block((2, 2, 2), (0.04, 0.04, 0.04))
 TOP = [0.02, 0.02, 0.04]
 ABOVE = [0.02, 0.02, 0.08]
-"""A strand of 40 mm stands on the middle of the top."""
+"""A fibre of 40 mm stands on the middle of the top."""
 AREA, TOUGHNESS = 1e-6, 500.0
 ENERGY = TOUGHNESS * AREA
 RESISTANCE = ENERGY / (2.0 * np.sqrt(AREA / np.pi))
@@ -41,7 +41,7 @@ def tied(tissue, **changes):
 
 
 def edge(y, *, x=(-0.01, 0.05), z=0.06, forward=1.0):
-    """An edge along x that cuts along y, half way up the strand."""
+    """An edge along x that cuts along y, half way up the fibre."""
     ends = [np.array([each, y, z]) for each in x]
     return BladeSegment(*ends, np.array([0.0, forward, 0.0]))
 
@@ -74,7 +74,7 @@ def test_the_blade_pays_toughness_times_section_at_any_speed(speed, relaxation, 
     energies = last(tissue).energies
     assert ligament.n_points == 0 and ligament.is_released
     assert energies.breaking == pytest.approx(ENERGY, rel=1e-9)
-    assert energies.work_of_blade > ENERGY  # it has stretched strand and tissue, too
+    assert energies.work_of_blade > ENERGY  # it has stretched fibre and tissue, too
     assert abs(energies.residual) < open_by * energies.work_of_blade
 
 
@@ -143,7 +143,7 @@ def test_momenta_of_a_free_body_change_by_what_blade_and_world_feel():
     ],
     ids=["its tip passes short of it", "above its end", "with its back ahead"],
 )
-def test_a_blade_that_does_not_sweep_its_edge_across_a_strand_leaves_it(beside):
+def test_a_blade_that_does_not_sweep_its_edge_across_a_fibre_leaves_it(beside):
     tissue = cube()
     ligament = tied(tissue)
     results = sweep(tissue, 0.01, 0.03, **beside)
@@ -159,7 +159,7 @@ def test_a_blade_that_stands_still_cuts_nothing():
     assert ligament.n_points == 1
 
 
-def test_an_edge_along_a_strand_cuts_nothing():
+def test_an_edge_along_a_fibre_cuts_nothing():
     tissue = cube()
     ligament = tied(tissue)
     for y in np.arange(0.019, 0.021, 1e-4):
@@ -174,7 +174,7 @@ def test_an_edge_along_a_strand_cuts_nothing():
     assert ligament.n_points == 1
 
 
-def test_a_strand_that_the_blade_backs_off_from_lies_straight_and_holds_as_before():
+def test_a_fibre_that_the_blade_backs_off_from_lies_straight_and_holds_as_before():
     tissue = cube(audit=True)
     ligament = tied(tissue)
     pressed = sweep(tissue, 0.01, 0.028, speed=0.05)[-1]
@@ -188,8 +188,8 @@ def test_a_strand_that_the_blade_backs_off_from_lies_straight_and_holds_as_befor
     )
 
 
-def test_a_slack_strand_goes_with_the_edge_and_is_cut_once_it_is_taut():
-    """Bent half way by b, a strand of 40 mm is sqrt(40^2 + 4 b^2) mm long: 45 mm at b = 10.3 mm."""
+def test_a_slack_fibre_goes_with_the_edge_and_is_cut_once_it_is_taut():
+    """Bent half way by b, a fibre of 40 mm is sqrt(40^2 + 4 b^2) mm long: 45 mm at b = 10.3 mm."""
     tissue = cube()
     ligament = tied(tissue, rest_length=0.045)
     slack = sweep(tissue, 0.01, 0.0302)
@@ -243,7 +243,7 @@ def test_a_body_falls_where_its_last_ligament_is_cut_and_the_account_closes():
     assert tissue.pieces()[0].velocity[2] - v0 == pytest.approx(-9.81 * 20 * DT, rel=1e-3)
 
 
-def test_another_attachment_that_comes_does_not_disturb_a_strand_that_is_being_cut():
+def test_another_attachment_that_comes_does_not_disturb_a_fibre_that_is_being_cut():
     tissues = cube(), cube()
     ligaments = [tied(tissue) for tissue in tissues]
     for tissue in tissues:

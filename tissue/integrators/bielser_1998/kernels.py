@@ -45,19 +45,19 @@ from tissue.core.structs import Arrays, IntCell
 from tissue.elasticity.spring_forces import NO_LENGTH
 from tissue.elasticity.springs import Springs
 from tissue.forces.step_context import StepContext
-from tissue.integrators.bielser_1998.node_rings import Rings, ring_of
+from tissue.integrators.bielser_1998.rings import Rings, ring_of
 from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR
 
 N_SEEN = 10
-"""Numbers in `Trails.seen` for each neighbour."""
+"""Numbers in `LocalClocks.seen` for each neighbour."""
 
 LARGEST_ROW = LARGEST_STAR + WIDTH
 """Neighbours of a node at most: each further tetrahedron around it, through a face, adds one to the
 three of the first; and a row is filled up."""
 
 
-class Trails(Arrays):
+class LocalClocks(Arrays):
     """How a neighbour sees each node: on a straight line since the node was moved last."""
 
     origins: FloatArray
@@ -69,16 +69,16 @@ class Trails(Arrays):
     """Number of the frame that moved it last, shape (capacity,)."""
     seen: FloatArray
     """What the node that is being moved sees of its neighbours, eight after eight: origins and
-    velocities of their trails, ways to them [m], and stiffness by squared length [N/m3]."""
+    velocities of their lines, vectors to them [m], and stiffness by squared length [N/m3]."""
     frame: IntCell
     """Number of the last frame."""
     n_known: IntCell
     """Number of nodes that there were in it."""
 
 
-def new_trails(n_nodes: int) -> Trails:
-    """Return trails of that many nodes."""
-    return Trails(
+def new_local_clocks(n_nodes: int) -> LocalClocks:
+    """Return local clocks of that many nodes."""
+    return LocalClocks(
         origins=room_for_points(n_nodes),
         clocks=np.zeros(n_nodes),
         frames=np.zeros(n_nodes, np.int64),
@@ -88,10 +88,12 @@ def new_trails(n_nodes: int) -> Trails:
     )
 
 
-def grown_trails(trails: Trails, n_nodes: int) -> Trails:
-    """Return the trails with room for that many nodes."""
+def grown_local_clocks(local_clocks: LocalClocks, n_nodes: int) -> LocalClocks:
+    """Return the local clocks with room for that many nodes."""
     of_nodes = ("origins", "clocks", "frames")
-    return trails.replaced(**{name: grown(getattr(trails, name), n_nodes) for name in of_nodes})
+    return local_clocks.replaced(
+        **{name: grown(getattr(local_clocks, name), n_nodes) for name in of_nodes}
+    )
 
 
 class FrameTimes(NamedTuple):
@@ -116,7 +118,7 @@ def hierarchical_frame(
     context: StepContext,
     edge: Edge,
     rings: Rings,
-    trails: Trails,
+    local_clocks: LocalClocks,
     every: IntArray,
     frame: FrameTimes,
 ) -> None:
@@ -127,14 +129,14 @@ def hierarchical_frame(
             should be in ring 0.
         edge: The cutting edge over the time step.
         rings: Searched up to `last_ring + 1`: the ring beyond the last is seen, but not moved.
-        trails: Scratch.
+        local_clocks: Scratch.
         every: Micro steps between two moves of a node of each ring, and last of those beyond; each
             divides the next. The nodes of ring 0 are moved in each micro step.
         frame: Times, and how far out nodes are moved.
     """
     body, blade, external = context.body, context.blade, context.stages.external
     last_ring, is_far_frozen, n = frame.last_ring, frame.is_far_frozen, frame.n
-    _lay_trails(body, rings, trails, last_ring, is_far_frozen)
+    _set_local_clocks(body, rings, local_clocks, last_ring, is_far_frozen)
     share = frame.end - frame.begin
     span = share * frame.dt
     n_far = every[last_ring + 1]
@@ -148,57 +150,59 @@ def hierarchical_frame(
             # The rings come in order, so that none further out is due either.
             if ring > last_ring or j % every[ring] != 0:
                 break
-            _move(context, trails, node, t1)
+            _move(context, local_clocks, node, t1)
         if j % n_far == 0 and not is_far_frozen:
             for node in range(body.n_nodes):
                 if not 0 <= ring_of(rings, node) <= last_ring:
-                    _move(context, trails, node, t1)
+                    _move(context, local_clocks, node, t1)
     clear_blade_forces(blade, body, external)
 
 
 @kernel
-def _lay_trails(
-    body: Body, rings: Rings, trails: Trails, last_ring: int, is_far_frozen: bool
+def _set_local_clocks(
+    body: Body, rings: Rings, local_clocks: LocalClocks, last_ring: int, is_far_frozen: bool
 ) -> None:
     """Give every node that takes part, or is seen by one that does, the clock of the frame."""
     if is_far_frozen:
         for k in range(rings.n_found):
             node = rings.order[k]
-            was_frozen = node < trails.n_known and trails.frames[node] != trails.frame
+            was_frozen = (
+                node < local_clocks.n_known and local_clocks.frames[node] != local_clocks.frame
+            )
             if was_frozen or rings.ring[node] > last_ring:
                 store_point(body.velocities, node, point_of(0.0, 0.0, 0.0))
             if rings.ring[node] <= last_ring:
-                trails.frames[node] = trails.frame + 1
-            _lay_trail(body, trails, node, 0.0)
+                local_clocks.frames[node] = local_clocks.frame + 1
+            _set_local_clock(body, local_clocks, node, 0.0)
     else:
         for node in range(body.n_nodes):
-            _lay_trail(body, trails, node, 0.0)
-    trails.frame += 1
-    trails.n_known = body.n_nodes
+            _set_local_clock(body, local_clocks, node, 0.0)
+    local_clocks.frame += 1
+    local_clocks.n_known = body.n_nodes
 
 
 @inlined
-def _lay_trail(body: Body, trails: Trails, node: int, clock: float) -> None:
-    trails.clocks[node] = clock
+def _set_local_clock(body: Body, local_clocks: LocalClocks, node: int, clock: float) -> None:
+    local_clocks.clocks[node] = clock
     origin = point(body.positions, node) - times(clock, point(body.velocities, node))
-    store_point(trails.origins, node, origin)
+    store_point(local_clocks.origins, node, origin)
 
 
 @kernel
-def _move(context: StepContext, trails: Trails, node: int, t1: float) -> None:
+def _move(context: StepContext, local_clocks: LocalClocks, node: int, t1: float) -> None:
     """Move one node alone, from its own clock to `t1` [s] since the begin of the frame."""
     body, springs, surroundings = context.body, context.elastic.springs, context.surroundings
     if body.fixed[node]:
         return
-    t0 = trails.clocks[node]
+    t0 = local_clocks.clocks[node]
     h = t1 - t0
     x, v = point(body.positions, node), point(body.velocities, node)
     time, drag = surroundings.retardation_time, surroundings.drag
     per_mass = 1.0 / body.masses[node]
     external = point(context.stages.external, node) + point(context.stages.loads, node)
     constant = point_of(*surroundings.gravity) + times(per_mass, external)
-    net = (springs, trails, node)
-    _look(body, *net)
+    net = (springs, local_clocks, node)
+    _note_neighbours(body, *net)
 
     a1 = constant - times(drag, v) + times(per_mass, _force(*net, t0, x, v, time))
     middle, v2 = x + times(0.5 * h, v) + times(0.125 * h * h, a1), v + times(0.5 * h, a1)
@@ -213,17 +217,17 @@ def _move(context: StepContext, trails: Trails, node: int, t1: float) -> None:
     both = a2 + a3
     store_point(body.positions, node, x + times(h, v) + times(h * h / 6.0, a1 + both))
     store_point(body.velocities, node, v + times(h / 6.0, a1 + both + both + a4))
-    _lay_trail(body, trails, node, t1)
+    _set_local_clock(body, local_clocks, node, t1)
 
 
 @inlined
-def _look(body: Body, springs: Springs, trails: Trails, node: int) -> None:
-    """Note the trails of the neighbours of a node, eight after eight."""
-    seen = trails.seen
+def _note_neighbours(body: Body, springs: Springs, local_clocks: LocalClocks, node: int) -> None:
+    """Note the lines of the neighbours of a node, eight after eight."""
+    seen = local_clocks.seen
     first = springs.first[node]
     for slot in range(first, first + filled(springs.count[node]), WIDTH):
         at = N_SEEN * (slot - first)
-        x, y, z = eight_points(trails.origins, springs.neighbour, slot)
+        x, y, z = eight_points(local_clocks.origins, springs.neighbour, slot)
         u, v, w = eight_points(body.velocities, springs.neighbour, slot)
         store_lanes(seen, at, x)
         store_lanes(seen, at + WIDTH, y)
@@ -236,7 +240,7 @@ def _look(body: Body, springs: Springs, trails: Trails, node: int) -> None:
 @inlined
 def _force(
     springs: Springs,
-    trails: Trails,
+    local_clocks: LocalClocks,
     node: int,
     t: float,
     position: Point,
@@ -247,7 +251,7 @@ def _force(
 
     Notes what `_resistance` needs.
     """
-    seen = trails.seen
+    seen = local_clocks.seen
     x, y, z = spread(position)
     u, v, w = spread(velocity)
     clock, time, one = lanes(t), lanes(retardation_time), lanes(1.0)
@@ -265,7 +269,7 @@ def _force(
         dz = load_lanes(seen, at + 2 * WIDTH) + clock * dw - z
         approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
         squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
-        per_squared = one / squared  # beside the root, not after it: nodes are moved one by one
+        per_squared = one / squared  # next to the root, not after it: nodes are moved one by one
         stiffness = load_lanes(springs.stiffness, slot)
         viscous = stiffness * per_squared
         elastic = stiffness - load_lanes(springs.rest_pull, slot) * per_squared * square_root(
@@ -281,12 +285,12 @@ def _force(
 
 
 @inlined
-def _resistance(springs: Springs, trails: Trails, node: int, speed: Point) -> Point:
+def _resistance(springs: Springs, local_clocks: LocalClocks, node: int, speed: Point) -> Point:
     """Force per retardation time [N/s] by which the dampers resist a speed of the node alone.
 
     At the position of the last `_force`.
     """
-    seen = trails.seen
+    seen = local_clocks.seen
     u, v, w = spread(speed)
     fx = fy = fz = lanes(0.0)
     for at in range(0, N_SEEN * filled(springs.count[node]), N_SEEN * WIDTH):

@@ -9,15 +9,14 @@ from tissue.blade.blade_context import BladeContext
 from tissue.blade.forces import apply_slip, frequency_with_blade
 from tissue.core.array_types import IntArray
 from tissue.forces.step_context import Increment
-from tissue.integrators.bielser_1998.focus import find_held, find_rings
 from tissue.integrators.bielser_1998.kernels import (
     FrameTimes,
-    grown_trails,
+    grown_local_clocks,
     hierarchical_frame,
-    new_trails,
+    new_local_clocks,
     ring_frequencies,
 )
-from tissue.integrators.bielser_1998.node_rings import grown_rings, new_rings
+from tissue.integrators.bielser_1998.rings import find_held, find_rings, grown_rings, new_rings
 from tissue.integrators.integrator import not_finite
 from tissue.integrators.methods import SAFETY, Hierarchical
 from tissue.integrators.model import TissueModel
@@ -43,7 +42,7 @@ class HierarchicalStepper:
         self._options = options
         self._rings = new_rings(n_nodes)
         self._held = new_rings(n_nodes)
-        self._trails = new_trails(n_nodes)
+        self._local_clocks = new_local_clocks(n_nodes)
         self._scratch = np.zeros(n_nodes, np.int64)
         self._moved = none_moved(n_nodes)
         self._highest = np.zeros(options.rings + 2)
@@ -77,8 +76,8 @@ class HierarchicalStepper:
         n, every = self._divide(system, increment.span)
         times = (increment.dt, increment.begin, increment.end)
         frame = FrameTimes(*times, n, options.rings, self._is_far_frozen)
-        rings, trails = self._rings, self._trails
-        hierarchical_frame(system.context, edge, rings, trails, every, frame)
+        rings, local_clocks = self._rings, self._local_clocks
+        hierarchical_frame(system.context, edge, rings, local_clocks, every, frame)
         blade, external = system.interaction.state, system.stages.external
         apply_slip(blade, body, system.visits, edge, external, increment.end, increment.span)
         note_moved(self._moved, rings.order, rings.n_found)
@@ -118,7 +117,7 @@ class HierarchicalStepper:
         self._rings = grown_rings(self._rings, n_nodes)
         self._held = grown_rings(self._held, n_nodes)
         self._scratch = np.zeros(n_nodes, np.int64)
-        self._trails = grown_trails(self._trails, n_nodes)
+        self._local_clocks = grown_local_clocks(self._local_clocks, n_nodes)
         self._moved = grown_moved(self._moved, n_nodes)
 
 

@@ -8,11 +8,12 @@ import pytest
 from tests.tissue.integrators.networks import block, found_nodes
 from tests.tissue.kernels_of import line_blade
 from tissue.blade.anchors import ANCHORED, new_anchors
-from tissue.integrators.bielser_1998.focus import find_held, find_rings
-from tissue.integrators.bielser_1998.node_rings import (
+from tissue.integrators.bielser_1998.rings import (
     UNREACHED,
     add_focus,
     begin_search,
+    find_held,
+    find_rings,
     new_rings,
     ring_of,
     search,

@@ -13,8 +13,8 @@ from tests.tissue.integrators.networks import (
     shake,
 )
 from tests.tissue.kernels_of import row
-from tissue.integrators.bielser_1998.kernels import new_trails
-from tissue.integrators.bielser_1998.node_rings import UNREACHED, ring_of
+from tissue.integrators.bielser_1998.kernels import new_local_clocks
+from tissue.integrators.bielser_1998.rings import UNREACHED, ring_of
 
 TOP = np.array([0.02, 0.02, 0.04])
 
@@ -75,10 +75,10 @@ def test_a_node_frozen_for_ten_seconds_moves_again_without_a_jump():
     body = network.body
     size = 0.04 / 4
     body.velocities[:] = 0.1
-    trails = new_trails(len(body.rest))
-    hierarchical_frames(network, near, span, int(10.0 / span), 2, 1, True, trails)
+    local_clocks = new_local_clocks(len(body.rest))
+    hierarchical_frames(network, near, span, int(10.0 / span), 2, 1, True, local_clocks)
     before = body.positions.copy()
-    hierarchical_frames(network, far, span, 1, 2, 1, True, trails)
+    hierarchical_frames(network, far, span, 1, 2, 1, True, local_clocks)
     assert 0.0 < np.abs(body.positions - before).max() < 0.01 * size
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tissue.integrators.networks import block, found_nodes, rings_around
-from tissue.integrators.bielser_1998.node_rings import (
+from tissue.integrators.bielser_1998.rings import (
     UNREACHED,
     add_focus,
     begin_search,
