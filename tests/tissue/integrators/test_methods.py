@@ -1,12 +1,45 @@
-"""Options of the relaxation, and the messages that refuse impossible ones."""
+"""Rows of methods, options of the relaxation, and messages that refuse impossible ones."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from tests.support.materials import SPRINGS
 from tissue import Hierarchical, Material, Verlet
-from tissue.integrators.methods import Global, checked_relaxation
+from tissue.integrators.methods import METHODS, Global, checked_relaxation, method_of
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "integrators.md"
+
+
+def test_kernels_find_a_method_by_its_place():
+    assert [method.number for method in METHODS.values()] == list(range(len(METHODS)))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_the_table_of_the_document_has_the_numbers_of_each_method(name):
+    row = re.search(rf"^\| `{name}` \|(.*)\|$", DOCUMENT.read_text(), re.MULTILINE)
+    method = METHODS[name]
+    cells = [cell.strip() for cell in row[1].split("|")]
+    damping = "between steps" if method.damps_between_steps else "in every stage"
+    numbers = [str(method.order), str(method.evaluations), f"{method.limit:.2f}"]
+    assert cells == [*numbers, f"{method.safety:.2f}", f"{method.safety_stiffening:.2f}", damping]
+
+
+@pytest.mark.parametrize(
+    ("choice", "law", "name"),
+    [
+        (Global(), "springs", "runge_kutta"),
+        (Global(), "neo_hookean", "nystroem"),
+        (Global(damping="step"), "springs", "nystroem"),
+        (Global(damping="stage"), "neo_hookean", "runge_kutta"),
+        (Verlet(), "springs", "verlet"),
+        (Hierarchical(), "springs", "runge_kutta"),
+    ],
+)
+def test_a_choice_and_a_law_stand_for_one_method(choice, law, name):
+    assert method_of(choice, law) is METHODS[name]
 
 
 @pytest.mark.parametrize(

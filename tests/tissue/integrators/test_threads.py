@@ -16,7 +16,7 @@ import pytest
 from tests.support import bodies, strokes
 from tests.support.materials import SPRINGS
 from tissue import Global, Material, SolverSettings, Tissue
-from tissue.integrators import threads as threaded
+from tissue.integrators import threads
 
 needs_two_cores = pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core")
 
@@ -66,14 +66,14 @@ def test_two_threads_give_the_same_bits_as_one(case):
 @pytest.mark.parametrize("case", ["solid", "solid, Verlet"])
 def test_a_thread_that_never_arrives_changes_nothing(monkeypatch, case):
     expected = digest_of(cut_through(1, case))
-    monkeypatch.setattr(threaded._Worker, "_work", lambda worker: None)
+    monkeypatch.setattr(threads._Worker, "_work", lambda worker: None)
     assert digest_of(cut_through(2, case)) == expected
 
 
 @needs_two_cores
 def test_a_thread_that_leaves_after_each_loop_changes_nothing(monkeypatch):
     expected = digest_of(cut_through(1, "solid"))
-    monkeypatch.setattr(threaded, "LONGEST_SPIN", 1)
+    monkeypatch.setattr(threads, "LONGEST_SPIN", 1)
     assert digest_of(cut_through(2, "solid")) == expected
 
 
