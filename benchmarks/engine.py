@@ -21,11 +21,11 @@ from tissue.contact.response.forces import add_contact_forces, end_contact_subst
 from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
-from tissue.elasticity.energy_density import neo_hookean
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.options import Global
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.step_context import Increment
+from tissue.laws.energy_density import neo_hookean
 from tissue.mesh.body import Body
 
 BlockCells = tuple[int, int, int]

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 Law = Literal["springs", "neo_hookean", "exponential", "yeoh"]
 """How forces follow from deformation: `springs` along edges, as in the paper, or tetrahedra under a
 stable `neo_hookean` law, or one of tissue that stiffens as it is stretched
-(`tissue.elasticity.stiffening`): `exponential` (Demiray), or a polynomial of third order
+(`tissue.laws.kernels`): `exponential` (Demiray), or a polynomial of third order
 (`yeoh`)."""
 
 PARAMETERS_OF_LAWS: dict[str, Law] = {

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissue import FloatArray, IntArray, TetrahedralMesh
-from tissue.elasticity.energy_density import EnergyDensity
+from tissue.laws.energy_density import EnergyDensity
 
 
 def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:

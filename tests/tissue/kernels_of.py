@@ -17,7 +17,6 @@ from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.collapse import no_collapse
-from tissue.elasticity.energy_density import volume_term
 from tissue.elasticity.finite_elements import no_solid, room_for_stars
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.mass_scaling import no_mass_scaling
@@ -35,6 +34,7 @@ from tissue.integrators.stages import Stages, new_stages
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.substeps import damp
 from tissue.integrators.support_state import supports_at_rest
+from tissue.laws.energy_density import volume_term
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.loose_pieces import no_loose_pieces

@@ -10,7 +10,7 @@ from tests.tissue.kernels_of import springs_of
 from tissue import BoolArray, FloatArray, TetrahedralMesh
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
-from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
+from tissue.elasticity.energy import solid_energy
 from tissue.elasticity.finite_elements import (
     Solid,
     build_stars,
@@ -19,7 +19,7 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
-from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import (
     displacement_gradients,
     displacements,
@@ -28,8 +28,8 @@ from tissue.elasticity.neo_hookean import (
     solid_force,
     solid_forces,
 )
-from tissue.elasticity.stored_energy import solid_energy
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks
+from tissue.laws.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.star import LARGEST_STAR, no_visits
 

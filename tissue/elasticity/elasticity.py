@@ -5,9 +5,7 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.elasticity.changed_frequencies import forget_added_mass, update_frequencies
 from tissue.elasticity.collapse import grown_collapse, no_collapse, renew_collapsing
-from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
     build_stars,
     build_tetrahedra,
@@ -15,15 +13,16 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
+from tissue.elasticity.frequency.changes import forget_added_mass, return_mass, update_frequencies
+from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
     no_mass_scaling,
 )
 from tissue.elasticity.relaxed_stress import inherit_relaxed
-from tissue.elasticity.returned_mass import return_mass
 from tissue.elasticity.springs import build_rows, grown_springs, no_springs
-from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
+from tissue.laws.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body

@@ -1,6 +1,6 @@
 """Forces of tetrahedra under a stable neo-Hookean law, a block of tetrahedra at a time.
 
-Laws that stiffen differ in the factor of the shear alone (`tissue.elasticity.stiffening`).
+Laws that stiffen differ in the factor of the shear alone (`tissue.laws.kernels`).
 
 With H the gradient of the displacement, F = 1 + H, K = cof F - 1 = (tr H) 1 - H^T + cof H and
 |F|^2 - 3 = 2 tr H + |H|^2, the force on node k is -V P grad N_k, where
@@ -38,10 +38,10 @@ from tissue.core.simd_blocks import (
 )
 from tissue.core.simd_gather import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
-from tissue.elasticity.energy_density import EnergyDensity
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
-from tissue.elasticity.stiffening import stiffening_factor, stiffens, stretch_invariant
+from tissue.laws.energy_density import EnergyDensity
+from tissue.laws.kernels import stiffening_factor, stiffens, stretch_invariant
 from tissue.mesh.body import Body
 
 NO_VOLUME = 1e-30

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.elasticity.energy_density import OWN_SHARE
+from tissue.laws.energy_density import OWN_SHARE
 from tissue.material import Material
 from tissue.types import TetrahedralMesh
 

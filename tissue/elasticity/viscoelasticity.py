@@ -39,7 +39,7 @@ from tissue.elasticity.neo_hookean import (
     pressure_of,
     shape_of,
 )
-from tissue.elasticity.stiffening import stiffening_factor, stiffens, stretch_invariant
+from tissue.laws.kernels import stiffening_factor, stiffens, stretch_invariant
 
 SMALLEST_RATIO = 0.1
 """J below which S is that of a tetrahedron of this J, with less of it: S has the factor 1 / J, and

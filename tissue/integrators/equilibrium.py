@@ -12,7 +12,7 @@ import numpy as np
 
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
-from tissue.elasticity.strained_frequency import StepLimit
+from tissue.elasticity.frequency.strained import StepLimit
 from tissue.integrators.equilibrium_checks import SupportConditions, fastest_node, gone_too_far
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.model import TissueModel

@@ -7,7 +7,7 @@ import numpy as np
 
 from tissue.core.jit import kernel
 from tissue.elasticity.internal_forces import Elastic, Surroundings
-from tissue.elasticity.stiffening import stiffens
+from tissue.laws.kernels import stiffens
 
 STAGE_DAMPED: Final = 0
 """The Runge-Kutta method, with damping in every stage."""

@@ -17,10 +17,9 @@ from tissue.core.simd import point, store_point, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.elasticity.collapse import find_collapsing
 from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.neo_hookean import keeps_gradients
-from tissue.elasticity.stiffening import stiffens
-from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
 from tissue.integrators.rest import (
     CALM_FASTEST,
@@ -42,6 +41,7 @@ from tissue.integrators.shared_loops import (
 )
 from tissue.integrators.stability import NYSTROEM, VERLET, damping_rate, stable_step
 from tissue.integrators.step_context import StepContext
+from tissue.laws.kernels import stiffens
 from tissue.mesh.bounding_boxes import largest_speed
 
 STEPS_BETWEEN_STRAIN_BOUNDS: Final = 2

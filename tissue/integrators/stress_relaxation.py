@@ -1,9 +1,9 @@
 """The step of quasi-linear viscoelasticity, between the steps of an integrator."""
 
 from tissue.core.jit import kernel
+from tissue.elasticity.energy import relaxed_energy
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.neo_hookean import has_averaged_volumes
-from tissue.elasticity.stored_energy import relaxed_energy
 from tissue.elasticity.viscoelasticity import prepare_relaxation
 from tissue.integrators.shared_loops import (
     DISPLACEMENTS,

@@ -10,8 +10,7 @@ from tissue.blade.impulse_totals import clear_works
 from tissue.blade.side_contact import sides_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.elasticity.energy import kinetic_energy, potential_energy
-from tissue.elasticity.internal_forces import elastic_energy
+from tissue.elasticity.energy import elastic_energy, kinetic_energy, potential_energy
 from tissue.integrators.attachments import attached_energy
 from tissue.integrators.model import TissueModel
 from tissue.integrators.step_context import StepContext

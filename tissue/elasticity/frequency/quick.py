@@ -23,7 +23,7 @@ from tissue.elasticity.neo_hookean import (
     gradient_of_shape,
     known_gradient,
 )
-from tissue.elasticity.stiffening import (
+from tissue.laws.kernels import (
     stiffening_factor,
     stiffening_slope,
     stiffens,

@@ -25,7 +25,7 @@ from tissue.core.simd_blocks import alike
 from tissue.core.simd_gather import larger, where_larger
 from tissue.core.simd_logarithm import logarithm
 from tissue.core.vec3 import Vec3, dot
-from tissue.elasticity.energy_density import EnergyDensity
+from tissue.laws.energy_density import EnergyDensity
 
 LARGEST_EXPONENT = 4.0
 """b q beyond which an exponential law stiffens no more: 55 times its modulus at rest, far beyond

@@ -14,7 +14,7 @@ class EnergyDensity(Arrays):
     """Energy per volume at rest: stable neo-Hookean (Smith, de Goes and Kim 2018), or stiffening.
 
     W = mu/2 (|F|^2 - 3) - mu/2 log(|F|^2 + 1) + lam/2 (J - a)^2
-    W = mu/2 w(|F|^2 - 1 - 2 J) + lam/2 (J - a)^2     (`tissue.elasticity.stiffening`)
+    W = mu/2 w(|F|^2 - 1 - 2 J) + lam/2 (J - a)^2     (`tissue.laws.kernels`)
 
     It is defined for J <= 0 as well: an inverted tetrahedron recovers. J of the last term is that
     of each tetrahedron, or the average over the tetrahedra around each node (Bonet and Burton
@@ -67,7 +67,7 @@ def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensit
 def stiffening(
     mu: float, lam: float, *, exponent: float = 0.0, second: float = 0.0, third: float = 0.0
 ) -> EnergyDensity:
-    """Return a law of `tissue.elasticity.stiffening` with the small-strain moduli `mu` and `lam`.
+    """Return a law of `tissue.laws.kernels` with the small-strain moduli `mu` and `lam`.
 
     The part of the volume term that the shear term cancels at small strain acts on each
     tetrahedron, as the shear does.

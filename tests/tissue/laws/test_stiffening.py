@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from tests.support import bodies
 from tests.tissue.solids import lame, solid_of
-from tissue.elasticity.energy_density import stiffening
-from tissue.elasticity.stiffening import LARGEST_EXPONENT, exponential_less_one
+from tissue.laws.energy_density import stiffening
+from tissue.laws.kernels import LARGEST_EXPONENT, exponential_less_one
 
 pytestmark = pytest.mark.kernel
 

@@ -1,0 +1,1 @@
+"""The laws of materials: how stress follows from deformation."""
