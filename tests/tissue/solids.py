@@ -29,7 +29,13 @@ from tissue.elasticity.neo_hookean import (
     solid_forces,
 )
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks
-from tissue.laws.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
+from tissue.laws.energy_density import (
+    EnergyDensity,
+    exponential,
+    neo_hookean,
+    polynomial,
+    volume_term,
+)
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.star import LARGEST_STAR, no_visits
 
@@ -55,8 +61,8 @@ LAWS = {
     "half averaged": law_of(0.45).replaced(
         mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15
     ),
-    "exponential": stiffening(*lame(0.45), exponent=12.0),
-    "yeoh": stiffening(*lame(0.45), second=2.0, third=5.0),
+    "exponential": exponential(*lame(0.45), 12.0),
+    "yeoh": polynomial(*lame(0.45), 2.0, 5.0),
 }
 
 

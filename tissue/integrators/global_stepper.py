@@ -35,7 +35,7 @@ from tissue.integrators.substeps import (
 )
 from tissue.integrators.threaded import Threads
 from tissue.integrators.unstable import UnstableError, not_finite
-from tissue.material import Law
+from tissue.laws.law import Law
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
 
@@ -62,7 +62,7 @@ def method_of(options: IntegratorOptions, law: Law) -> Method:
     """
     if isinstance(options, Verlet):
         return Method(verlet_steps, relax_by_verlet, VERLET, True)
-    usual = "stage" if law == "springs" else "step"
+    usual = "stage" if law.has_springs else "step"
     if isinstance(options, Global) and (options.damping or usual) == "step":
         return Method(nystroem_steps, relax_by_nystroem, NYSTROEM, True)
     return Method(runge_kutta_steps, relax_by_runge_kutta, STAGE_DAMPED, False)

@@ -97,18 +97,18 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Global, "
             "Verlet or Hierarchical with settings"
         )
-    has_tetrahedra = material.law != "springs" or material.volume_modulus > 0.0
+    has_tetrahedra = not material.law.has_springs or material.volume_modulus > 0.0
     if isinstance(choice, Hierarchical) and has_tetrahedra:
         raise ValueError(
             "hierarchical relaxation moves one node at a time, on its springs alone; with law "
-            f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
-            "Choose law springs with poisson_ratio 0.25, or relaxation verlet, which is fast under "
-            "every law"
+            f"{material.law.name} and poisson_ratio {material.poisson_ratio} tetrahedra resist "
+            "too. Choose law springs with poisson_ratio 0.25, or relaxation verlet, which is fast "
+            "under every law"
         )
     if isinstance(choice, Verlet) and material.stiffens:
         raise ValueError(
-            f"relaxation verlet gains energy under law {material.law}: beside a blade elements get "
-            "many times as stiff from one step to the next. Choose relaxation global, which does "
-            "not, or law neo_hookean"
+            f"relaxation verlet gains energy under law {material.law.name}: beside a blade "
+            "elements get many times as stiff from one step to the next. Choose relaxation global, "
+            "which does not, or law neo_hookean"
         )
     return choice
