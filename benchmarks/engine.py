@@ -9,7 +9,6 @@ from tissue import (
     BoolArray,
     FloatArray,
     IntArray,
-    Law,
     Material,
     SolverSettings,
     TetrahedralMesh,
@@ -21,11 +20,11 @@ from tissue.contact.response.forces import add_contact_forces, end_contact_subst
 from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
-from tissue.elasticity.energy_density import neo_hookean
 from tissue.forces.step_context import Increment
 from tissue.forces.terms import accelerations
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.methods import Global, method_of
+from tissue.laws.energy_density import neo_hookean
 from tissue.mesh.body import Body
 
 BlockCells = tuple[int, int, int]
@@ -57,7 +56,7 @@ FRAME_DT = 1e-3
 YOUNG_MODULUS = 3e3
 """Young's modulus of the blocks [Pa]: so soft that in cells of 10 mm a step of 1 ms is stable under
 every explicit scheme that is measured here, those of other engines too."""
-POISSON_RATIO: dict[Law, float] = {"springs": 0.25, "neo_hookean": 0.3}
+POISSON_RATIO: dict[str, float] = {"springs": 0.25, "neo_hookean": 0.3}
 """Poisson's ratio under each law: that of springs without a volume term, and what other engines get
 under their laws for tetrahedra."""
 DENSITY = 1e3
@@ -65,7 +64,7 @@ DENSITY = 1e3
 _TOUGHNESS = 5.0
 """Toughness [J/m2], so low that the engine does not warn of too coarse a mesh; nothing is cut."""
 
-LAW_NAMES: dict[Law, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
+LAW_NAMES: dict[str, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
 """The laws that are measured, and their names in the tables."""
 
 VECTOR_LENGTH: int = WIDTH
@@ -115,7 +114,7 @@ def sizes_up_to(sizes: tuple[int, ...], largest: int | None) -> tuple[int, ...]:
     return left
 
 
-def block_material(law: Law, *, is_damped: bool = True) -> Material:
+def block_material(law: str, *, is_damped: bool = True) -> Material:
     """Return the material of the blocks, with the default damping or with none along edges."""
     material = Material(
         young_modulus=YOUNG_MODULUS,
@@ -134,7 +133,7 @@ class EngineLoops:
 
     Args:
         mesh: The block.
-        law: Law of elasticity.
+        law: Name of the law of elasticity.
         is_damped: Whether there are dampers along the edges.
         is_averaged: Whether dilatation is averaged over nodes, as the engine does, or taken in
             each tetrahedron, as other engines do.
@@ -144,14 +143,14 @@ class EngineLoops:
     def __init__(
         self,
         mesh: TetrahedralMesh,
-        law: Law = "springs",
+        law: str = "springs",
         *,
         is_damped: bool = True,
         is_averaged: bool = True,
         precision: str = "double",
     ) -> None:
         material = block_material(law, is_damped=is_damped)
-        self._stepper = GlobalStepper(method_of(Global(damping="step"), law))
+        self._stepper = GlobalStepper(method_of(Global(damping="step"), material.law))
         solver = SolverSettings(relaxation=Global(damping="step"), precision=precision)
         self._tissue = Tissue(mesh, material, fixed=held_nodes(mesh), solver=solver)
         if not is_averaged:

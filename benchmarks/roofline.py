@@ -1,7 +1,7 @@
 """The limits of this machine, bandwidth and arithmetic, and the share of them that a step uses.
 
 What a Runge-Kutta step of springs moves and computes is counted by hand, stage by stage, from
-`tissue.elasticity.spring_forces` and `tissue.integrators.nystroem` as the loops are written: a
+`tissue.elasticity.springs` and `tissue.integrators.nystroem` as the loops are written: a
 change of either is a change here. What a row gathers from its neighbours is not counted as bytes:
 the same pass over the nodes reads them anyway.
 """

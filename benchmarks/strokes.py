@@ -207,7 +207,7 @@ def _result(
     right = ("stroke", "tetrahedra", "pieces", "substeps", "contacts", "CPU ms", "fastest")
 
     def show(console: "Console") -> None:
-        title = f"organ, law {scene.material.law}, relaxation {scene.solver.relaxation}"
+        title = f"organ, law {scene.material.law.name}, relaxation {scene.solver.relaxation}"
         table = compact_table(title, (), (*right, *("residual %",) * scene.solver.audit))
         for i, each in enumerate(done, start=1):
             row = [*map(str, (i, *each[:4])), f"{1e3 * each.seconds:.2f}", f"{each.fastest:.2f}"]

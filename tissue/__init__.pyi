@@ -30,12 +30,19 @@ from .integrators.methods import Hierarchical as Hierarchical
 from .integrators.methods import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .laws import LAWS as LAWS
+from .laws.exponential import Exponential as Exponential
+from .laws.law import Law as Law
+from .laws.law import LawKey as LawKey
+from .laws.law import Moduli as Moduli
+from .laws.mass_spring import MassSpring as MassSpring
+from .laws.neo_hookean import NeoHookean as NeoHookean
+from .laws.yeoh import Yeoh as Yeoh
 from .loads.attachment import Attachment as Attachment
 from .loads.frame_path import FramePath as FramePath
 from .loads.ligament import Ligament as Ligament
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
-from .material import Law as Law
 from .material import Material as Material
 from .material_presets import DAMPING_BAND as DAMPING_BAND
 from .material_presets import MATERIALS as MATERIALS
@@ -88,7 +95,14 @@ __all__ = [
     "IntArray",
     "LARGEST_COORDINATE",
     "LARGEST_STRENGTH",
+    "LAWS",
+    "Exponential",
     "Law",
+    "LawKey",
+    "Moduli",
+    "NeoHookean",
+    "MassSpring",
+    "Yeoh",
     "Attachment",
     "FramePath",
     "Ligament",

@@ -6,8 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.internal_forces import Elastic
-from tissue.fields.node_strain import largest_principal_strains
-from tissue.fields.node_stress import von_mises_stresses
+from tissue.fields.node_fields import largest_principal_strains, von_mises_stresses
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh

@@ -1,23 +1,16 @@
 """The material of the tissue, in quantities that can be measured."""
 
+import inspect
 import logging
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
-from typing import Any, Literal, get_args
+from collections.abc import Iterable, Mapping
+from dataclasses import InitVar, dataclass, fields, replace
+from typing import Any
 
-Law = Literal["springs", "neo_hookean", "exponential", "yeoh"]
-"""How forces follow from deformation: `springs` along edges, as in the paper, or tetrahedra under a
-stable `neo_hookean` law, or one of tissue that stiffens as it is stretched
-(`tissue.elasticity.stiffening`): `exponential` (Demiray), or a polynomial of third order
-(`yeoh`)."""
-
-PARAMETERS_OF_LAWS: dict[str, Law] = {
-    "stiffening": "exponential",
-    "yeoh_second": "yeoh",
-    "yeoh_third": "yeoh",
-}
-"""Parameters that only one law has, and the law. Under the others they are 0."""
+from tissue.laws import LAWS
+from tissue.laws.law import Law, Moduli
+from tissue.laws.mass_spring import MassSpring
+from tissue.laws.neo_hookean import NeoHookean
 
 CENTRAL_FORCE_RATIO = 0.25
 """Poisson's ratio of an isotropic network of springs: forces along the lines between nodes make
@@ -39,9 +32,25 @@ what is faster."""
 _log = logging.getLogger("tissue")
 
 
+class _LawOrName:
+    """The field `law` of a material: set to a law or the name of one, read as a law."""
+
+    def __get__(self, material: "Material | None", owner: type) -> Law:
+        if material is None:  # the default
+            return NeoHookean()
+        law: Law = vars(material)["_law"]
+        return law
+
+    def __set__(self, material: "Material", law: Law | str) -> None:
+        vars(material)["_law"] = law
+
+
 @dataclass(frozen=True)
 class Material:
     """An isotropic soft tissue.
+
+    The law is one of `tissue.LAWS` or of your own, `law=Exponential(5.0)`, or the name of a law
+    with its parameters as keywords, `law="exponential", stiffening=5.0`.
 
     Raises:
         ValueError: a quantity is not finite, has the wrong sign, or is impossible under the law.
@@ -80,47 +89,51 @@ class Material:
     """Coulomb's coefficient of friction where cut faces, pieces and the floor touch. Fresh muscle
     on bone was measured at 0.29 to 0.36 (Shacham, Castel and Gefen 2010); a wet serous skin slips
     more easily."""
-    law: Law = "neo_hookean"
+    law: _LawOrName = _LawOrName()
     """How forces follow from deformation."""
     poisson_ratio: float = 0.45
     """Transverse contraction over extension. Springs alone have 1/4; for more each tetrahedron also
     resists a change of its volume, and less is impossible with springs. Soft tissue is mostly water
     and hardly compressible: 0.45 to 0.49."""
-    stiffening: float = 0.0
-    """b of the law `exponential`: stretched to length 1 + e its modulus is some exp(3 b e^2) times
-    that at rest. Soft organs have 5 to 30."""
-    yeoh_second: float = 0.0
-    """C20 / C10 of the law `yeoh`, in the notation of Yeoh's paper."""
-    yeoh_third: float = 0.0
-    """C30 / C10 of the law `yeoh`."""
-    spring_calibration: float = 1.0
-    """Stiffness of the springs over that of van Gelder's formula, under law springs only. 1 unless
-    the mesh was calibrated by `tissue.elasticity.spring_calibration.calibrated`."""
+    stiffening: InitVar[float | None] = None
+    """`Exponential.b`, where the law is given by name; read it from the law. So the next three."""
+    yeoh_second: InitVar[float | None] = None
+    """`Yeoh.c2`."""
+    yeoh_third: InitVar[float | None] = None
+    """`Yeoh.c3`."""
+    spring_calibration: InitVar[float | None] = None
+    """`MassSpring.calibration`."""
     prony: tuple[tuple[float, float], ...] = ()
     """Relaxation of stress, as g and tau [s] of one to three terms; none: no stress relaxes. Held
     tissue keeps G(t) = 1 - sum of g (1 - exp(-t / tau)) of its stress (Fung's quasi-linear
     viscoelasticity, `tissue.elasticity.viscoelasticity`). `young_modulus` and the other stiffnesses
     are those of fast motion."""
 
-    def __post_init__(self) -> None:
-        if self.law not in get_args(Law):
-            raise ValueError(f"no law is called {self.law!r}. Known: {', '.join(get_args(Law))}")
+    def __post_init__(
+        self,
+        stiffening: float | None,
+        yeoh_second: float | None,
+        yeoh_third: float | None,
+        spring_calibration: float | None,
+    ) -> None:
+        given = {
+            "stiffening": stiffening,
+            "yeoh_second": yeoh_second,
+            "yeoh_third": yeoh_third,
+            "spring_calibration": spring_calibration,
+        }
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name not in ("law", "prony") and (not math.isfinite(value) or value < 0.0):
                 raise ValueError(f"{field.name} is {value}; it must be finite and not negative")
-        for name in ("young_modulus", "density", "spring_calibration", "toughness_speed"):
+        for name in ("young_modulus", "density", "toughness_speed"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} is 0; it must be positive")
+        parameters = {name: value for name, value in given.items() if value is not None}
+        object.__setattr__(self, "law", law_with(self.law, parameters))
         self._check_ratio()
-        self._check_stiffening()
-        if self.law != "springs" and self.spring_calibration != 1.0:
-            raise ValueError(
-                f"spring_calibration is {self.spring_calibration} with law {self.law}, whose "
-                "stiffness is exact on any mesh: leave it at 1, or choose law springs"
-            )
         object.__setattr__(self, "prony", checked_series(self.prony))
-        if self.prony and self.law == "springs":
+        if self.prony and self.law.has_springs:
             raise ValueError(
                 "prony is given with law springs, whose stress does not relax: leave it out, or "
                 "choose law neo_hookean, exponential or yeoh"
@@ -134,44 +147,60 @@ class Material:
                 f"poisson_ratio is {ratio}; it must be below 0.5, where no force changes the "
                 "volume and no time step is short enough. Soft tissue is simulated at 0.45 to 0.49"
             )
-        if self.law == "springs" and ratio < CENTRAL_FORCE_RATIO:
+        if self.law.has_springs and ratio < CENTRAL_FORCE_RATIO:
             raise ValueError(
                 f"poisson_ratio is {ratio}; springs act along the lines between nodes, and such "
                 "a body has at least 0.25. Use law neo_hookean, which allows 0 to below 0.5"
             )
 
-    def _check_stiffening(self) -> None:
-        """Refuse a parameter of another law, and a law that would not stiffen."""
-        for name, law in PARAMETERS_OF_LAWS.items():
-            if self.law != law and getattr(self, name) != 0.0:
-                raise ValueError(
-                    f"{name} is {getattr(self, name)} with law {self.law}, which does not have it: "
-                    f"leave it at 0, or choose law {law}"
-                )
-        given = [name for name, law in PARAMETERS_OF_LAWS.items() if law == self.law]
-        if given and not any(getattr(self, name) for name in given):
-            raise ValueError(
-                f"law {self.law} without stiffening: {' or '.join(given)} must be positive. "
-                "Tissue that does not stiffen has law neo_hookean"
-            )
-
     def changed(self, **changes: Any) -> "Material":
-        """Return the material with some quantities replaced.
+        """Return the material with some quantities replaced, or parameters of its law.
 
-        Another law drops the parameters that only the law before has.
+        Another law drops the parameters of the law before.
 
         Raises:
             TypeError: there is no such quantity.
             ValueError: as for a new material.
         """
-        if changes.get("law", self.law) != self.law:
-            changes = dict.fromkeys(PARAMETERS_OF_LAWS, 0.0) | changes
-        return replace(self, **changes)
+        law = changes.pop("law", self.law)
+        if law == self.law.name:
+            law = self.law
+        keys = {key for kind in LAWS.values() for key in kind.keys} | self.law.keys.keys()
+        parameters = {key: changes.pop(key) for key in keys & changes.keys()}
+        return replace(self, law=law_with(law, parameters), **changes)
+
+    @classmethod
+    def of_keys(cls, keys: Mapping[str, Any]) -> "Material":
+        """Return the material of the quantities that `as_keys` returns, or of some of them.
+
+        Raises:
+            TypeError: there is no such quantity.
+            ValueError: as for a new material.
+        """
+        return cls().changed(**keys)
+
+    def as_keys(self) -> dict[str, Any]:
+        """Return what decides the material, by the names that files have.
+
+        The law is given by its name, and its parameters as numbers; those that only other laws
+        have are neutral.
+        """
+        neutral = {name: key.neutral for kind in LAWS.values() for name, key in kind.keys.items()}
+        own = {name: getattr(self.law, key.field) for name, key in self.law.keys.items()}
+        of_law = neutral | own | {"law": self.law.name}
+        names = inspect.signature(Material).parameters
+        quantities = {name: getattr(self, name) for name in names if name not in of_law}
+        return {name: (of_law | quantities)[name] for name in [*names, *of_law]}
 
     @property
     def stiffens(self) -> bool:
         """Whether it gets stiffer as it is stretched."""
-        return self.law in ("exponential", "yeoh")
+        return self.law.stiffens
+
+    @property
+    def moduli(self) -> Moduli:
+        """The moduli at small strain."""
+        return Moduli(self.mu, self.lam, self.volume_modulus)
 
     @property
     def mu(self) -> float:
@@ -192,7 +221,8 @@ class Material:
         constants 0.4 E. So 2.5 mu gives the body its shear modulus; at a Poisson's ratio of 1/4 it
         is Young's modulus, and above that `volume_modulus` adds what is missing.
         """
-        return 2.5 * self.mu * self.spring_calibration
+        calibration = self.law.calibration if isinstance(self.law, MassSpring) else 1.0
+        return 2.5 * self.mu * calibration
 
     @property
     def volume_modulus(self) -> float:
@@ -268,6 +298,45 @@ class Material:
         has viscosity 2.5 mu per second of retardation time, and Young's modulus 2 mu (1 + nu).
         """
         return 0.8 * (1.0 + self.poisson_ratio)
+
+
+def law_with(law: Law | str, parameters: dict[str, float]) -> Law:
+    """Return a law with some of its parameters replaced, or the law of a name.
+
+    Args:
+        law: The law, or its name.
+        parameters: Values by the names that files have for them. Those of other laws are neutral.
+
+    Raises:
+        ValueError: no law has the name, a parameter is not one of the law, or is impossible.
+    """
+    if isinstance(law, str):
+        if law not in LAWS:
+            raise ValueError(f"no law is called {law!r}. Known: {', '.join(LAWS)}")
+        kind, own = LAWS[law], {}
+    else:
+        kind, own = type(law), {key.field: getattr(law, key.field) for key in law.keys.values()}
+    for name, value in parameters.items():
+        if name in kind.keys:
+            own[kind.keys[name].field] = value
+        else:
+            _expect_neutral(kind.name, name, value)
+    return kind(**own)
+
+
+def _expect_neutral(law: str, name: str, value: float) -> None:
+    """Check that a parameter which a law does not have says nothing.
+
+    Raises:
+        ValueError: it does.
+    """
+    kind = next(kind for kind in LAWS.values() if name in kind.keys)
+    neutral = kind.keys[name].neutral
+    if value != neutral:
+        raise ValueError(
+            f"{name} is {value} with law {law}, which does not have it: leave it at "
+            f"{neutral:g}, or choose law {kind.name}"
+        )
 
 
 def checked_series(series: Iterable[Iterable[float]]) -> tuple[tuple[float, float], ...]:

@@ -6,7 +6,7 @@ states how the tissue was loaded. Values that could not be traced to a measureme
 
 from typing import Any, NamedTuple
 
-from tissue.material import Law, Material
+from tissue.material import Material
 
 DAMPING_BAND = (5.0, 1000.0)
 """Band of frequencies [Hz] at both ends of which the presets have their damping ratio, and less
@@ -35,8 +35,8 @@ class Preset(NamedTuple):
     """Name of the material."""
     about: str
     """Description in a few words."""
-    law: Law
-    """Law of the material."""
+    law: str
+    """Name of its law."""
     young_modulus: SourcedValue
     """Young's modulus at small strain [Pa]."""
     poisson_ratio: SourcedValue

@@ -165,16 +165,14 @@ def ours(body: PeerBody, case: str) -> PeerStepper:
         case: LAW:METHOD:DAMPING, then :plain where dilatation is not averaged over nodes, and
             :single for forces in single precision.
     """
-    from typing import cast
-
     from benchmarks.engine import EngineLoops
     from scalpel_sim.version import version
-    from tissue import Law, TetrahedralMesh
+    from tissue import TetrahedralMesh
 
     law, method, damping, *more = case.split(":")
     loops = EngineLoops(
         TetrahedralMesh(body.positions, body.tetrahedra),
-        cast(Law, law),
+        law,
         is_damped=damping == "damped",
         is_averaged="plain" not in more,
         precision="single" if "single" in more else "double",

@@ -147,13 +147,13 @@ def template(material: Material, about: str, preset: Preset | None = None) -> st
         "the command line, such as --young, overrides the key."
     )
     sources = {} if preset is None else preset.values
-    lines = [*_comment(head), "", "[material]", *_keys(MaterialTable, material, sources)]
-    lines += ["[blade]", *_keys(BladeTable, table_of_blade(SCALPEL), {})]
+    lines = [*_comment(head), "", "[material]", *_keys(MaterialTable, material.as_keys(), sources)]
+    lines += ["[blade]", *_keys(BladeTable, msgspec.structs.asdict(table_of_blade(SCALPEL)), {})]
     return "\n".join(lines[:-1]) + "\n"
 
 
 def _keys(
-    table: type[msgspec.Struct], values: object, sources: dict[str, SourcedValue]
+    table: type[msgspec.Struct], values: dict[str, Any], sources: dict[str, SourcedValue]
 ) -> list[str]:
     """Return the lines of a table: for each key its meaning, its source and its value."""
     lines = []
@@ -161,7 +161,7 @@ def _keys(
         lines += _comment(re.sub(r"\[([^]]+)\]\([^)]+\)", r"\1", text))  # links are for pages
         if key in sources:
             lines += _comment(_origin(sources[key]))
-        value = msgspec.to_builtins(getattr(values, key))
+        value = msgspec.to_builtins(values[key])
         lines += [f"{key} = {tomlkit.item(value).as_string()}", ""]
     return lines
 

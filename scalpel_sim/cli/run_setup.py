@@ -179,11 +179,11 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
     """
     if not (options.calibrate or options.spring_error):
         return scene, {}
-    if scene.material.law != "springs":
+    if not scene.material.law.has_springs:
         option = "--calibrate" if options.calibrate else "--spring-error"
         raise UsageError(
-            f"{option} is about law springs; law {scene.material.law} is as stiff as asked for on "
-            "any mesh. Add --law springs, or omit it"
+            f"{option} is about law springs; law {scene.material.law.name} is as stiff as "
+            "requested on any mesh. Add --law springs, or omit it"
         )
     from tissue import calibrated, spring_error
 
@@ -198,7 +198,7 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
             "young_modulus_softest_pa": error.softest,
             "young_modulus_stiffest_pa": error.stiffest,
             "poisson_ratio": error.relaxed.poisson_ratio,
-            "calibration": scene.material.spring_calibration,
+            "calibration": scene.material.as_keys()["spring_calibration"],
         }
     }
 

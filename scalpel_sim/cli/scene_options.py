@@ -150,7 +150,7 @@ def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> 
         )
     body = {"shape": "mesh", "file": str(mesh)} | ({} if scale is None else {"scale": scale})
     # The gel that a scene without a material has, for options to change.
-    material = {key: getattr(GEL, key) for key in ("law", "young_modulus", "blade_friction")}
+    material = {key: GEL.as_keys()[key] for key in ("law", "young_modulus", "blade_friction")}
     content = {"about": f"the mesh {mesh.name}", "body": body, "material": material}
     return SceneFile(content, mesh.stem, Path())
 

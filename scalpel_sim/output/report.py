@@ -7,6 +7,7 @@ from rich.table import Table
 
 from scalpel_sim.output.summary import COMPLETE, TABLE_1, Summary
 from scalpel_sim.recording.recording import TERMS
+from tissue import LAWS
 
 STAGE_NAMES = {
     "RX": "relaxation",
@@ -100,7 +101,8 @@ def _speed(summary: Summary) -> str:
         return factor
     settings = summary.settings
     faster = []
-    stiffens = settings.get("material", {}).get("law") in ("exponential", "yeoh")
+    law = LAWS.get(settings.get("material", {}).get("law"))
+    stiffens = law is not None and law.stiffens
     if settings.get("relaxation") == "global" and not stiffens:
         faster.append("--relaxation verlet")
     if settings.get("audit"):

@@ -170,7 +170,7 @@ def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:
     volume = sum(piece.volume for piece in pieces) / sum(piece.rest_volume for piece in pieces)
     if inverted <= MOST_INVERTED and volume >= LEAST_VOLUME:
         return
-    remedies = ["--law neo_hookean"] if material.law == "springs" else []
+    remedies = ["--law neo_hookean"] if material.law.has_springs else []
     if material.poisson_ratio < _HARDLY_COMPRESSIBLE:
         remedies.append(f"--poisson-ratio {_HARDLY_COMPRESSIBLE}")
     remedies.append("a larger --young")

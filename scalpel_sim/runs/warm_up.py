@@ -76,7 +76,7 @@ class KernelSet(NamedTuple):
     def of(cls, scene: Scene) -> "KernelSet":
         """Return the set that a scene needs."""
         has_sides = scene.blade is not None
-        law, solver = scene.material.law, scene.solver
+        law, solver = scene.material.law.name, scene.solver
         how = (solver.audit, has_sides, solver.precision)
         relaxes = bool(scene.material.prony)
         is_held = bool(scene.attachments) or any(

@@ -100,7 +100,9 @@ def check_solver(solver: SolverTable, material: Material) -> None:
             "--audit, or choose one of those"
         )
     if relaxation == "verlet" and material.stiffens:
-        raise UsageError(f"--relaxation verlet gains energy under law {material.law}; use global")
+        raise UsageError(
+            f"--relaxation verlet gains energy under law {material.law.name}; use global"
+        )
     if not (solver.mass_scaling >= 0.0 and math.isfinite(solver.mass_scaling)):
         raise UsageError(
             f"--mass-scaling is {solver.mass_scaling}; it is an angular frequency [1/s], or 0 "

@@ -1,7 +1,7 @@
 """A scene: a body, its material, how it is held, and the strokes through it."""
 
 from collections.abc import Callable
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -156,7 +156,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         own |= {"torque": arm.torque, "pos": world.pos, "quat": world.quat}
         return {
             "about": self.about,
-            "material": asdict(self.material),
+            "material": self.material.as_keys(),
             "fixed": self.body.fixed,
             "cut": asdict(self.cut),
             "scheme": solver.scheme,
@@ -201,11 +201,11 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     stroke, or a CSV file, which replaces those of the scene; `speed` and `depth` are those of each.
     """
     given = dict(changes)
-    properties = {each.name for each in fields(Material)} & given.keys()
+    properties = scene.material.as_keys().keys() & given.keys()
     if properties or "material" in given:
         material = given.pop("material", scene.material)
         material = material.changed(**{name: given.pop(name) for name in properties})
-        given["material_table"] = PresetMaterialTable(**asdict(material))
+        given["material_table"] = PresetMaterialTable(**material.as_keys())
     if "mesh" in given:
         fixed, stretch = scene.body.fixed, scene.body.stretch
         given["body"] = GivenBody(source=given.pop("mesh"), fixed=fixed, stretch=stretch)
@@ -251,7 +251,7 @@ def material_of(table: PresetMaterialTable) -> Material:
         return material_called(preset).changed(**given)
     if "law" not in given or "young_modulus" not in given:
         raise UsageError("it needs a preset, or a law and a young_modulus")
-    return Material(**given)
+    return Material.of_keys(given)
 
 
 def given_in(table: msgspec.Struct) -> dict[str, Any]:

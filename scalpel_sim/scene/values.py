@@ -4,13 +4,13 @@ The description of each is what an error says the value must be.
 """
 
 import sys
-from typing import Annotated, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
 
 from bridge import MAX_FRAMES_PER_ANSWER
-from tissue import Law
+from tissue import LAWS
 
 WIDEST_OPENING = 0.02
 """Largest distance between the pads of a grasper [m]."""
@@ -114,4 +114,8 @@ Region = Annotated[
         'or a sphere ("sphere:0.01,0.02,0.03,0.005")',
     ),
 ]
-LawName = Annotated[Law, one_of(*get_args(Law))]
+if TYPE_CHECKING:
+    _LawName = str
+else:  # the laws that there are when the schema is made
+    _LawName = Literal[tuple(LAWS)]
+LawName = Annotated[_LawName, one_of(*LAWS)]

@@ -1,7 +1,6 @@
 """From a scene to a file that gives the same run."""
 
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
     """
     content = msgspec.to_builtins(scene)
     content["body"]["stretch"] = scene.body.stretched_by
-    content["material"] = msgspec.to_builtins(asdict(scene.material))
+    content["material"] = msgspec.to_builtins(scene.material.as_keys())
     content["blade"] = {"thickness": 0.0}
     if scene.blade is not None:
         content["blade"] = msgspec.to_builtins(table_of_blade(scene.blade))

@@ -13,7 +13,6 @@ from tissue import (
     BladeSweep,
     Energies,
     FloatArray,
-    Law,
     Material,
     SolverSettings,
     StepResult,
@@ -45,7 +44,7 @@ _ABOVE_BLOCK = 0.5e-3
 
 
 def soft_material(
-    law: Law = "neo_hookean",
+    law: str = "neo_hookean",
     *,
     young_modulus: float = 10e3,
     poisson_ratio: float | None = None,
@@ -55,7 +54,7 @@ def soft_material(
     """Return the material of the block: as soft as an organ.
 
     Args:
-        law: Law of elasticity.
+        law: Name of the law of elasticity.
         young_modulus: Young's modulus [Pa].
         poisson_ratio: Poisson's ratio; None: nearly incompressible, or 1/4 for springs.
         toughness: Fracture toughness [J/m2].

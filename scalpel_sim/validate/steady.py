@@ -26,7 +26,7 @@ from scalpel_sim.validate.findings import (
     farthest_from_one,
     within,
 )
-from tissue import Law, Material, block
+from tissue import Material, block
 
 STEADY_YOUNG_MODULUS = 30e3
 """Young's modulus [Pa], high enough for neo-Hookean tetrahedra of both meshes and all toughnesses
@@ -39,7 +39,7 @@ STEADY_CELLS = (8, 20, 4), (12, 30, 6)
 """Cells of the two meshes: sides of 5 mm, and of two thirds of that."""
 _STEADY_FROM, _STEADY_TO = 0.045, 0.08
 """Positions of the edge along the block between which its cut is steady [m]."""
-_TOUGHNESSES: dict[Law, tuple[float, ...]] = {
+_TOUGHNESSES: dict[str, tuple[float, ...]] = {
     "neo_hookean": (5.0, 20.0, 60.0, 160.0),
     "exponential": (5.0, 20.0, 60.0, 160.0),
     "springs": (5.0, 20.0),
@@ -134,7 +134,7 @@ def _measure(quick: bool) -> Findings:
     return Findings(checks, [plot])
 
 
-def steady_material(law: Law, toughness: float) -> Material:
+def steady_material(law: str, toughness: float) -> Material:
     """Return the material of the block, of a law and a toughness [J/m2]."""
     more = {"stiffening": _STIFFENING} if law == "exponential" else {}
     return soft_material(law, young_modulus=STEADY_YOUNG_MODULUS, toughness=toughness, **more)

@@ -12,7 +12,7 @@ from scalpel_sim.validate.block import (
     straight_cut,
 )
 from scalpel_sim.validate.findings import THEORY, Check, Findings, ValidationScene
-from tissue import BladeShape, Law, TetrahedralMesh, block
+from tissue import BladeShape, TetrahedralMesh, block
 
 _LARGEST = 0.05
 """Largest lateral force over cutting force."""
@@ -33,7 +33,7 @@ def mirrored_block(cells: tuple[int, int, int]) -> TetrahedralMesh:
     return TetrahedralMesh(points, place.ravel()[np.concatenate((half.tetrahedra, turned))])
 
 
-def _lateral_share(law: Law, cells: tuple[int, int, int], blade: BladeShape | None) -> float:
+def _lateral_share(law: str, cells: tuple[int, int, int], blade: BladeShape | None) -> float:
     """Cut through the middle; return the mean lateral force over the mean cutting force."""
     material = soft_material(law, young_modulus=_STIFFNESS, blade_friction=0.3)
     tissue = block_tissue(material, mesh=mirrored_block(cells), blade=blade)
@@ -44,7 +44,7 @@ def _lateral_share(law: Law, cells: tuple[int, int, int], blade: BladeShape | No
 
 def _measure(quick: bool) -> Findings:
     """Cut mirrored blocks under both laws, with a bare edge and with a scalpel."""
-    laws: tuple[Law, ...] = ("neo_hookean", "springs")
+    laws: tuple[str, ...] = ("neo_hookean", "springs")
     checks = []
     for law in laws:
         for cells in (COARSE_CELLS,) if quick else (COARSE_CELLS, FINE_CELLS):

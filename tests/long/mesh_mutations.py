@@ -12,7 +12,8 @@ import numpy as np
 from tests.tissue.io import mesh_writers as write
 from tests.tissue.io.test_mesh_io import BLOCK, FILES
 from tissue import TetrahedralMesh, read_mesh
-from tissue.mesh.validation import MeshError, expect_sound
+from tissue.mesh.mesh_arrays import MeshError
+from tissue.mesh.validation import expect_sound
 
 WORDS = (
     *(b"nan", b"inf", b"-inf", b"-1", b"0", b"1", b"2", b"3", b"4", b"5", b"10", b"1e9", b"4e9"),

@@ -4,7 +4,7 @@ import numpy as np
 
 from tests.support import naive_solid
 from tissue import FloatArray, TetrahedralMesh
-from tissue.elasticity.energy_density import EnergyDensity
+from tissue.laws.energy_density import EnergyDensity
 
 
 def elastic_parts(

@@ -16,7 +16,6 @@ from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.collapse import no_collapse
-from tissue.elasticity.energy_density import volume_term
 from tissue.elasticity.finite_elements import no_solid, room_for_stars
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.mass_scaling import no_mass_scaling
@@ -33,6 +32,7 @@ from tissue.forces.terms import accelerations
 from tissue.integrators.damping import damp
 from tissue.integrators.driver import take_steps
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
+from tissue.laws.energy_density import volume_term
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.loose_pieces import no_loose_pieces

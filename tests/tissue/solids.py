@@ -10,7 +10,7 @@ from tests.tissue.kernels_of import springs_of
 from tissue import BoolArray, FloatArray, TetrahedralMesh
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
-from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
+from tissue.elasticity.energy import solid_energy
 from tissue.elasticity.finite_elements import (
     Solid,
     build_stars,
@@ -19,7 +19,7 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
-from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import (
     displacement_gradients,
     displacements,
@@ -28,8 +28,14 @@ from tissue.elasticity.neo_hookean import (
     solid_force,
     solid_forces,
 )
-from tissue.elasticity.stored_energy import solid_energy
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks
+from tissue.laws.energy_density import (
+    EnergyDensity,
+    exponential,
+    neo_hookean,
+    polynomial,
+    volume_term,
+)
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.star import LARGEST_STAR, no_visits
 
@@ -55,8 +61,8 @@ LAWS = {
     "half averaged": law_of(0.45).replaced(
         mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15
     ),
-    "exponential": stiffening(*lame(0.45), exponent=12.0),
-    "yeoh": stiffening(*lame(0.45), second=2.0, third=5.0),
+    "exponential": exponential(*lame(0.45), 12.0),
+    "yeoh": polynomial(*lame(0.45), 2.0, 5.0),
 }
 
 

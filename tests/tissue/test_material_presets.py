@@ -37,6 +37,6 @@ def test_the_material_of_a_preset_has_its_values(preset: Preset):
     values = preset.values
     damping_ratio = values.pop("damping_ratio").value
     for name, quantity in values.items():
-        assert getattr(material, name) == quantity.value
+        assert material.as_keys()[name] == quantity.value
     for frequency in DAMPING_BAND:
         assert material.damping_ratio(frequency) == pytest.approx(damping_ratio)

@@ -34,7 +34,7 @@ steps."""
 
 LARGEST_STIFFNESS = 64.0
 """Stiffness of such an anchor per Young's modulus and length of edge, at most: about as much as the
-laws can stiffen (`tissue.elasticity.stiffening.LARGEST_EXPONENT`)."""
+laws can stiffen (`tissue.laws.kernels.LARGEST_EXPONENT`)."""
 
 FREE, ANCHORED, RETRACTED, LEFT = 0, 1, 2, 3
 """State of a sample: FREE, outside the tissue; ANCHORED, pulling on it; RETRACTED, backed off from

@@ -13,8 +13,8 @@ from tissue.blade.forces import clear_blade_forces
 from tissue.blade.side_forces import add_side_stiffness
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
+from tissue.elasticity.frequency.strained import limited_frequency
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.limited_frequency import limited_frequency
 from tissue.mesh.body import Body
 
 LIMIT_AT_BLADE = 0.5

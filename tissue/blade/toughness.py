@@ -74,7 +74,7 @@ def expect_toughness_in_range(material: Material, node_size: float) -> None:
     Raises:
         ValueError: it would, and the force would be that of the fold.
     """
-    if material.law == "springs" and _is_too_tough(material, node_size):
+    if material.law.has_springs and _is_too_tough(material, node_size):
         raise ValueError(
             f"{_toughness_in_nodes(material, node_size)}: springs fold ahead of the blade above "
             f"{TOUGHEST['springs']:g}, and the force would be that of the fold. Use law "
@@ -89,20 +89,20 @@ def warn_of_toughness(material: Material, node_size: float) -> None:
         material: What the body is made of.
         node_size: Mean node size of its mesh [m].
     """
-    if material.law != "springs" and _is_too_tough(material, node_size):
+    if not material.law.has_springs and _is_too_tough(material, node_size):
         _log.warning(
             "%s: tetrahedra ahead of the blade are strained beyond the range of law %s, and the "
             "force of the first centimetres drops to some 60 %% where elements open. Use a lower "
             "toughness, a stiffer material, or a law that stiffens, exponential",
             _toughness_in_nodes(material, node_size),
-            material.law,
+            material.law.name,
         )
 
 
 def _is_too_tough(material: Material, node_size: float) -> bool:
     """Return whether toughness over Young's modulus is beyond the range of the law."""
     length = material.toughness / material.young_modulus
-    return length > TOUGHEST.get(material.law, math.inf) * node_size
+    return length > TOUGHEST.get(material.law.name, math.inf) * node_size
 
 
 def _toughness_in_nodes(material: Material, node_size: float) -> str:

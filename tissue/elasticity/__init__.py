@@ -1,22 +1,18 @@
-"""Forces inside the body, by law, and the bounds on the frequencies that they cause.
+"""Forces inside the body, and the bounds on the frequencies that they cause.
 
 In the order in which they are best read:
 
     elasticity              owner of the arrays; follows the cuts
     internal_forces         the force on a node: springs, tetrahedra, or both
-    springs                 masses, and springs along the edges
-    spring_forces           forces of springs and dampers
+    springs                 masses, springs along the edges, and their forces
     finite_elements         tetrahedra as elements: rest shapes, and the star of each node
-    energy_density          the laws of tetrahedra, and their constants
-    neo_hookean             forces of tetrahedra under these laws
-    stiffening              exponential and polynomial laws of tissue that stiffens
+    neo_hookean             forces of tetrahedra; what laws differ in is in `tissue.laws.kernels`
+    collapse                what keeps tetrahedra from turning inside out where springs alone act
+    relaxed_stress          the stress that has relaxed, and its part in the forces
+    viscoelasticity         how it relaxes
     energy                  energies of the body, and the power of damping
-    frequency_bound         a bound on the frequencies of tetrahedra at rest
-    frequency_refinement    the same bound brought near the truth
-    changed_frequencies     both, and the mass that nodes get, after a cut
+    frequency/              bounds on the frequencies
     mass_scaling            mass for the nodes of slivers
-    limited_frequency       mass for nodes that are made fast between cuts
-    strained_frequency      a bound for tetrahedra as they are deformed now
     stiffness_matrix        the body at small strain as a matrix, for calibration and theory
-    spring_calibration      springs that are as stiff as asked for on a given mesh
+    spring_calibration      springs with the requested stiffness on a given mesh
 """

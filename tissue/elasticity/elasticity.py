@@ -5,9 +5,7 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.elasticity.changed_frequencies import forget_added_mass, update_frequencies
 from tissue.elasticity.collapse import grown_collapse, no_collapse, renew_collapsing
-from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
     build_stars,
     build_tetrahedra,
@@ -15,15 +13,16 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
+from tissue.elasticity.frequency.changes import forget_added_mass, return_mass, update_frequencies
+from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
     no_mass_scaling,
 )
 from tissue.elasticity.relaxed_stress import inherit_relaxed
-from tissue.elasticity.returned_mass import return_mass
 from tissue.elasticity.springs import build_rows, grown_springs, no_springs
-from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
+from tissue.laws.energy_density import volume_term
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
@@ -64,7 +63,7 @@ class Elasticity:
         """Whether forces of tetrahedra are computed in single precision."""
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
-        law = _law_of(material)
+        law = material.law.density(material.moduli)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self._may_collapse = law is None and resists_collapse
         self.arrays = Elastic(
@@ -81,7 +80,7 @@ class Elasticity:
                 if self._may_collapse
                 else no_collapse(0, 0, 0.0)
             ),
-            has_springs=int(material.law == "springs"),
+            has_springs=int(material.law.has_springs),
             has_tetrahedra=int(law is not None),
             highest=0.0,
             highest_of_tetrahedra=0.0,
@@ -92,7 +91,7 @@ class Elasticity:
         self._has_solid = law is not None
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
-        if mass_scaling is not None and material.law != "springs":
+        if mass_scaling is not None and not material.law.has_springs:
             scaling = self.arrays.scaling
             scaling.allowed = max(mass_scaling**2, self.arrays.highest_of_tetrahedra)
             scaling.allowed_between_cuts = scaling.allowed
@@ -188,17 +187,3 @@ class Elasticity:
                 solid, len(solid.first), len(body.tetrahedra), 2 * len(solid.corner)
             )
             self.arrays = self.arrays.replaced(solid=larger)
-
-
-def _law_of(material: Material) -> EnergyDensity | None:
-    """Return the energy density of the tetrahedra; None where springs alone are elastic."""
-    if material.law == "neo_hookean":
-        return neo_hookean(material.mu, material.lam)
-    if material.law == "exponential":
-        return stiffening(material.mu, material.lam, exponent=material.stiffening)
-    if material.law == "yeoh":
-        second, third = material.yeoh_second, material.yeoh_third
-        return stiffening(material.mu, material.lam, second=second, third=third)
-    if material.volume_modulus > 0.0:
-        return volume_term(material.volume_modulus)
-    return None

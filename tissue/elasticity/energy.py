@@ -1,11 +1,64 @@
-"""Energies stored in the body, and the power that damping dissipates."""
+"""Energies stored in the body, and the power that damping dissipates.
+
+Tetrahedra store the energy of their law, and what relaxation changes in it. With R and r constant
+they are elastic, with the energy
+
+    W - V R : E - V r (J - 1)        E = (F^T F - 1) / 2
+
+to which each Maxwell element adds g times the complementary energy of R / g and r / g, the energy
+that they have by themselves, as at small strain:
+
+    V (|dev R|^2 / (4 mu g) + K (r / M)^2 / (2 g))        K = lam + 2/3 mu
+
+M is the modulus from which the pressure of the law follows, p = M (J - 1); where tissue stiffens
+the first term is smaller (`tissue.laws.kernels.complementary_energy`). The sum is the free energy
+where strains are small: of held tissue 1 - sum of g_i of W is left in the end. As R and r change it
+falls, by what the dashpots dissipate. At large strain the shares of what is stored and what is
+dissipated are estimates; their sum is exact.
+"""
 
 from tissue.core.array_types import FloatArray
-from tissue.core.jit import kernel
-from tissue.core.simd import store_point
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import Lanes, store_point
+from tissue.core.simd_blocks import alike, load_block, sum_of_lanes, width_of
+from tissue.core.simd_gather import larger
 from tissue.core.vec3 import Vec3, dot, vec3
-from tissue.elasticity.internal_forces import Elastic, Surroundings, elastic_energy, viscous_force
+from tissue.elasticity.collapse import collapse_energy
+from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, n_blocks
+from tissue.elasticity.internal_forces import Elastic, Surroundings, viscous_force
+from tissue.elasticity.neo_hookean import (
+    cofactors_of,
+    dilated_around,
+    displacement_gradients,
+    displacements,
+    known_gradient,
+    own_dilatation,
+    shape_of,
+)
+from tissue.elasticity.relaxed_stress import (
+    PRESSURE,
+    relaxed_pressure,
+    relaxes,
+    rows_of_stress,
+)
+from tissue.elasticity.springs import spring_energy
+from tissue.laws.kernels import complementary_energy, shear_energy
 from tissue.mesh.body import Body
+
+
+@kernel
+def elastic_energy(elastic: Elastic, body: Body) -> float:
+    """Return the elastic energy of the body now, less that at rest [J].
+
+    Where stress relaxes, that in the springs of the Maxwell elements is a part of it.
+    """
+    energy = 0.0
+    if elastic.has_springs:
+        energy += spring_energy(elastic.springs, body)
+        energy += collapse_energy(elastic.collapsing, body)
+    if elastic.has_tetrahedra:
+        energy += solid_energy(elastic.solid, body, body.positions)
+    return energy
 
 
 @kernel
@@ -67,3 +120,106 @@ def dissipated_power(
             store_point(scratch, node, force)
             power -= dot(vec3(scratch, node), v)
     return power
+
+
+@kernel
+def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
+    """Return the energy stored in the tetrahedra at `positions` [m], less that at rest [J]."""
+    law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
+    displacements(solid, body, positions, solid.every, 0, body.n_nodes)
+    displacement_gradients(solid, solid.every, 0, blocks)
+    energy = 0.0
+    for block in range(blocks):
+        energy += sum_of_lanes(_energies(solid, block))
+    for node in range(body.n_nodes):
+        v = solid.node_volume[node]
+        energy += v * _bulk_energy(law.lam_of_nodes, dilated_around(solid, node) / v, law.a)
+    if relaxes(solid):
+        energy += relaxed_energy(solid, blocks)
+    return energy
+
+
+@kernel
+def relaxed_energy(solid: Solid, blocks: int) -> float:
+    """Return what relaxation adds to the energy of the elastic law, which may be negative [J].
+
+    After `displacement_gradients`.
+
+    Args:
+        solid: The tetrahedra.
+        blocks: How many blocks there are of them.
+    """
+    energy = 0.0
+    for block in range(blocks):
+        energy += sum_of_lanes(_relaxed_energies(solid, block))
+    return energy
+
+
+@inlined
+def _relaxed_energies(solid: Solid, block: int) -> Lanes:
+    """Return what relaxation adds to the energies of the tetrahedra of a block [J]."""
+    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    x, y, z = known_gradient(solid, block)
+    v = shape_of(solid, block, VOLUME)
+    rx, ry, rz = rows_of_stress(solid.relaxed, width * N_RELAXED * block)
+    # R : E = R : H + sum over the rows h of H of h . R h / 2
+    strained = dot(rx, x) + dot(ry, y) + dot(rz, z)
+    squares = _quadratic(x, rx, ry, rz) + _quadratic(y, rx, ry, rz) + _quadratic(z, rx, ry, rz)
+    total = alike(-1.0, v) * (strained + alike(0.5, v) * squares)
+    total = total - relaxed_pressure(solid, block) * own_dilatation(solid, block, v)
+    for term in range(n_terms):
+        at = width * N_RELAXED * (n_terms * block + term)
+        rx, ry, rz = rows_of_stress(solid.relaxed_terms, at)
+        r = load_block(solid.relaxed_terms, at + width * PRESSURE)
+        total = total + _complementary(solid, term, rx, ry, rz, r)
+    return v * total
+
+
+@inlined
+def _quadratic(h: Vec3, rx: Vec3, ry: Vec3, rz: Vec3) -> Lanes:
+    """Return h . R h."""
+    return dot(h, Vec3(dot(rx, h), dot(ry, h), dot(rz, h)))
+
+
+@inlined
+def _complementary(solid: Solid, term: int, rx: Vec3, ry: Vec3, rz: Vec3, r: Lanes) -> Lanes:
+    """Return the complementary energy of a term [J/m3].
+
+    Args:
+        solid: Moduli and shares.
+        term: The term.
+        rx: First row of its R.
+        ry: Second row.
+        rz: Third row.
+        r: Its pressure.
+    """
+    law, g = solid.law, solid.relaxing_shares[term]
+    mu, modulus = law.shear_modulus, law.lam_of_tetrahedra + law.lam_of_nodes
+    bulk = modulus - law.excess + mu * 2.0 / 3.0
+    trace = rx.x + ry.y + rz.z
+    deviator = dot(rx, rx) + dot(ry, ry) + dot(rz, rz) - alike(1.0 / 3.0, r) * trace * trace
+    y = larger(alike(0.5 / (mu * g) ** 2, r) * deviator, alike(0.0, r))
+    shear = alike(0.5 * mu * g, r) * complementary_energy(law, y)
+    return shear + alike(0.5 * bulk / (g * modulus**2), r) * r * r
+
+
+@inlined
+def _energies(solid: Solid, block: int) -> Lanes:
+    """Return the energies of the tetrahedra of a block by themselves [J].
+
+    After `displacement_gradients`.
+    """
+    law, width = solid.law, width_of(solid.shape)
+    x, y, z = known_gradient(solid, block)
+    v = shape_of(solid, block, VOLUME)
+    shear = shear_energy(law, x.x + y.y + z.z, (x, y, z), cofactors_of(x, y, z))
+    dilatation = load_block(solid.dilated, width * (1 + block))
+    ratio = own_dilatation(solid, block, v)
+    bulk = dilatation * (ratio + alike(2.0 * (1.0 - law.a), v))
+    return alike(0.5 * law.mu, v) * v * shear + alike(0.5 * law.lam_of_tetrahedra, v) * bulk
+
+
+@kernel
+def _bulk_energy(lam: float, dilatation: float, a: float) -> float:
+    """Return lam/2 ((J - a)^2 - (1 - a)^2) [J/m3], `dilatation` is J - 1."""
+    return 0.5 * lam * dilatation * (dilatation + 2.0 * (1.0 - a))

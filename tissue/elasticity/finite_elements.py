@@ -22,8 +22,8 @@ from tissue.core.simd import WIDTH, aligned, filled
 from tissue.core.simd_blocks import row_of_lane, width_of
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
-from tissue.elasticity.energy_density import EnergyDensity
 from tissue.geometry.tetrahedron import tetrahedron_volume
+from tissue.laws.energy_density import EnergyDensity
 from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
 
@@ -77,20 +77,20 @@ class Solid(Arrays, two_precisions=True):
     node_volume: FloatArray
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
     weight: FloatArray
-    """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency_bound`), shape
+    """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency.at_rest`), shape
     (nodes,)."""
     dilatation: FloatArray
     """Term of the averaged volume of each node in that bound [N/m3/kg^0.5], shape (nodes,)."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
     ring: FloatArray
-    """Scratch of `frequency_bound`: sums at the nodes of a star, shape (LARGEST_RING, 3)."""
+    """Scratch of `frequency.at_rest`: sums at the nodes of a star, shape (LARGEST_RING, 3)."""
     ring_nodes: IntArray
-    """Scratch of `frequency_bound`: the nodes of a star, shape (LARGEST_RING,)."""
+    """Scratch of `frequency.at_rest`: the nodes of a star, shape (LARGEST_RING,)."""
     listed: IntArray
-    """Nodes whose bound was written by the last call of `frequency_bound`, shape (nodes,)."""
+    """Nodes whose bound was written by the last call of `frequency.at_rest`, shape (nodes,)."""
     raised: IntArray
-    """Scratch of `frequency_refinement`: nodes given a larger weight, shape (nodes,)."""
+    """Scratch of `frequency.at_rest`: nodes given a larger weight, shape (nodes,)."""
     used: IntCell
     """Number of slots of the pool in use."""
     every: IntArray
@@ -103,11 +103,11 @@ class Solid(Arrays, two_precisions=True):
     dilated: FloatArray
     """Scratch: V (J - 1) of tetrahedron t [m3], behind a first block of zeros."""
     growth: FloatArray
-    """Scratch of `quick_frequency` and of energies: growth of the faces of tetrahedron t,
+    """Scratch of `frequency.quick` and of energies: growth of the faces of tetrahedron t,
     behind a first block."""
     tested_growth: FloatArray
     """Growth of the faces of tetrahedron t when the bound was last evaluated at its nodes, behind a
-    first block (`tested_frequency`); 1 where it was not."""
+    first block (`frequency.strained`); 1 where it was not."""
     tested_bound: FloatArray
     """Bound on w^2 at the nodes of tetrahedron t that was found then [1/s2], behind a first
     block; 0 where it was not evaluated."""
@@ -117,17 +117,17 @@ class Solid(Arrays, two_precisions=True):
     shear_share: FloatArray
     """Share of that bound that the shear part of the law alone would have [1]."""
     strained_bound: FloatArray
-    """Scratch of `quick_frequency`: a quick bound on w^2 of tetrahedron t [1/s2], behind a first
+    """Scratch of `frequency.quick`: a quick bound on w^2 of tetrahedron t [1/s2], behind a first
     block."""
     fast_blocks: IntArray
-    """Scratch of `quick_frequency`: blocks with a tetrahedron that may be too fast."""
+    """Scratch of `frequency.quick`: blocks with a tetrahedron that may be too fast."""
     stiffening: FloatArray
-    """Scratch of `quick_frequency`, under laws that stiffen: shear modulus of tetrahedron t over
-    that at rest, behind a first block (`tissue.elasticity.stiffening`)."""
+    """Scratch of `frequency.quick`, under laws that stiffen: shear modulus of tetrahedron t over
+    that at rest, behind a first block (`tissue.laws.kernels`)."""
     stiffening_slope: FloatArray
-    """Scratch of `quick_frequency`, under laws that stiffen: how fast that rises."""
+    """Scratch of `frequency.quick`, under laws that stiffen: how fast that rises."""
     stiffness: FloatArray
-    """Scratch of `quick_frequency`, under laws that stiffen: a bound on the stiffness of the
+    """Scratch of `frequency.quick`, under laws that stiffen: a bound on the stiffness of the
     shear part over that at rest."""
     tested_stiffness: FloatArray
     """`stiffness` at the test of `tested_growth`."""
@@ -135,9 +135,9 @@ class Solid(Arrays, two_precisions=True):
     """The part of `frequency_squared` that the shear part of the law alone would have [1/s2],
     under laws that stiffen; shape (nodes,)."""
     strained_dilatation: FloatArray
-    """Scratch of `tested_frequency`: `dilatation` as the body is deformed, shape (nodes,)."""
+    """Scratch of `frequency.strained`: `dilatation` as the body is deformed, shape (nodes,)."""
     strained_frequency_squared: FloatArray
-    """Scratch of `tested_frequency`: `frequency_squared` as it is deformed, shape (nodes,)."""
+    """Scratch of `frequency.strained`: `frequency_squared` as it is deformed, shape (nodes,)."""
     dilatation_test: IntArray
     """Test in which `strained_dilatation` was written, shape (nodes,)."""
     frequency_test: IntArray

@@ -9,13 +9,16 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
-from tissue.elasticity.collapse import Collapsing, collapse_energy
+from tissue.elasticity.collapse import Collapsing
 from tissue.elasticity.finite_elements import Solid, n_blocks
 from tissue.elasticity.mass_scaling import MassScaling
 from tissue.elasticity.neo_hookean import solid_force, solid_forces
-from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_force, elastic_force
-from tissue.elasticity.springs import Springs, spring_energy
-from tissue.elasticity.stored_energy import solid_energy
+from tissue.elasticity.springs import (
+    Springs,
+    damping_force,
+    elastic_and_damping_force,
+    elastic_force,
+)
 from tissue.mesh.body import Body
 
 
@@ -127,18 +130,3 @@ def bound_both_frequencies(elastic: Elastic, nodes: IntArray, n: int) -> None:
         if elastic.has_tetrahedra:
             bound += elastic.solid.frequency_squared[node]
         elastic.frequency_squared[node] = bound
-
-
-@kernel
-def elastic_energy(elastic: Elastic, body: Body) -> float:
-    """Return the elastic energy of the body now, less that at rest [J].
-
-    Where stress relaxes, that in the springs of the Maxwell elements is a part of it.
-    """
-    energy = 0.0
-    if elastic.has_springs:
-        energy += spring_energy(elastic.springs, body)
-        energy += collapse_energy(elastic.collapsing, body)
-    if elastic.has_tetrahedra:
-        energy += solid_energy(elastic.solid, body, body.positions)
-    return energy

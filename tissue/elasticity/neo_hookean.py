@@ -1,6 +1,6 @@
 """Forces of tetrahedra under a stable neo-Hookean law, a block of tetrahedra at a time.
 
-Laws that stiffen differ in the factor of the shear alone (`tissue.elasticity.stiffening`).
+Other laws differ in the factors of the shear alone (`tissue.laws.kernels`).
 
 With H the gradient of the displacement, F = 1 + H, K = cof F - 1 = (tr H) 1 - H^T + cof H and
 |F|^2 - 3 = 2 tr H + |H|^2, the force on node k is -V P grad N_k, where
@@ -38,10 +38,9 @@ from tissue.core.simd_blocks import (
 )
 from tissue.core.simd_gather import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
-from tissue.elasticity.energy_density import EnergyDensity
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
-from tissue.elasticity.stiffening import stiffening_factor, stiffens, stretch_invariant
+from tissue.laws.kernels import shear_factors
 from tissue.mesh.body import Body
 
 NO_VOLUME = 1e-30
@@ -186,7 +185,7 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
         block: The block.
         has_relaxed: Whether stress has relaxed in it; a constant where this is called.
     """
-    law, width = solid.law, width_of(solid.shape)
+    width = width_of(solid.shape)
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
     p = pressure_of(solid, block, v)
@@ -194,12 +193,7 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
         p = p - relaxed_pressure(solid, block)
     trace = x.x + y.y + z.z
     cx, cy, cz = cofactors_of(x, y, z)
-    if stiffens(law):
-        rest = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
-        s = alike(0.0, v)
-    else:
-        s = isotropic_factor(law, trace, x, y, z)
-        rest = alike(0.75 * law.mu, v)
+    rest, s = shear_factors(solid.law, trace, (x, y, z), (cx, cy, cz))
     # The factors of H, K and 1, times -V:
     minus_v = alike(-1.0, v) * v
     a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
@@ -247,21 +241,6 @@ def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return J - 1 of the tetrahedra of a block by themselves, after `displacement_gradients`."""
     dilated = load_block(solid.dilated, width_of(solid.shape) * (1 + block))
     return dilated / (v + alike(NO_VOLUME, v))
-
-
-@inlined
-def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
-    """Return s of the neo-Hookean law [Pa].
-
-    Args:
-        law: The law.
-        trace: tr H.
-        x: First row of H.
-        y: Second row.
-        z: Third row.
-    """
-    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-    return alike(0.25 * law.mu, trace) * grown / (grown + alike(4.0, trace))
 
 
 @inlined

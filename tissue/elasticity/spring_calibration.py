@@ -14,6 +14,7 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.elasticity.stiffness_matrix import gradients, stiffness_matrix
+from tissue.laws.mass_spring import MassSpring
 from tissue.material import Material
 from tissue.mesh.faces import sorted_faces
 from tissue.mesh.mesh_arrays import mesh_arrays
@@ -111,7 +112,7 @@ def spring_error(mesh: TetrahedralMesh, material: Material) -> SpringError:
 def calibrated(mesh: TetrahedralMesh, material: Material) -> Material:
     """Return the material with springs such that this mesh has the Young's modulus asked for.
 
-    One factor on all springs (`Material.spring_calibration`), found by the secant method on the
+    One factor on all springs (`MassSpring.calibration`), found by the secant method on the
     relaxed modulus of `spring_error`. The Poisson's ratio of the mesh and its anisotropy stay as
     they are.
 
@@ -119,20 +120,21 @@ def calibrated(mesh: TetrahedralMesh, material: Material) -> Material:
         ValueError: the law has no springs; or no factor gives this modulus, because the volume term
             alone is too stiff on this mesh.
     """
-    if material.law != "springs":
+    if not isinstance(material.law, MassSpring):
         raise ValueError(
-            f"law {material.law} has no springs to calibrate: its stiffness is exact on any mesh"
+            f"law {material.law.name} has no springs to calibrate: its stiffness is exact on any "
+            "mesh"
         )
 
     def error(factor: float) -> float:
-        return spring_error(mesh, replace(material, spring_calibration=factor)).young_modulus_error
+        return spring_error(mesh, replace(material, law=MassSpring(factor))).young_modulus_error
 
     before, factor = 1.0, 1.0 / (1.0 + error(1.0))
     error_before = error(before)
     for _ in range(MOST_TRIALS):
         error_now = error(factor)
         if abs(error_now) < CALIBRATED:
-            return replace(material, spring_calibration=factor)
+            return replace(material, law=MassSpring(factor))
         slope = (error_now - error_before) / (factor - before)
         before, error_before = factor, error_now
         factor = max(factor - error_now / slope, 0.1 * factor) if slope > 0.0 else 0.5 * factor

@@ -1,20 +1,30 @@
-"""Masses at nodes and springs along edges, as one row of neighbours for each node.
+"""Masses at nodes, springs along edges as one row of neighbours for each node, and their forces.
 
 Each spring is in the rows of both its ends, so that the force on a node is a gather: no scatter, no
 race, the same bits for any number of threads. A row depends only on the tetrahedra around its node;
-after a cut only the rows of touched nodes are written again. A row is padded to a multiple of eight
-with springs without stiffness from the node to itself, so that forces are evaluated eight at a time
-(`spring_forces`).
+after a cut only the rows of touched nodes are written again. A row is padded to a multiple of
+eight with springs without stiffness from the node to itself, so that forces are evaluated eight at
+a time.
 
 Stiffness of an edge (van Gelder): k = E * (volume of the tetrahedra around it) / (rest length)^2.
-Pull of a spring on its ends: k (l - l0).
+Pull of a spring on its ends: k (l - l0). Dampers along the edges have the stiffness of springs.
 """
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
-from tissue.core.jit import kernel
-from tissue.core.simd import WIDTH, filled
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import (
+    WIDTH,
+    Point,
+    eight_points,
+    filled,
+    lanes,
+    load_lanes,
+    square_root,
+    summed,
+    times,
+)
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import norm, sub, vec3
 from tissue.geometry.tetrahedron import (
@@ -25,6 +35,10 @@ from tissue.geometry.tetrahedron import (
 )
 from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
+
+NO_LENGTH = 1e-300
+"""Added to squared lengths [m2], far below any: it prevents division by zero in slots without a
+spring and between nodes that coincide."""
 
 SPRING_POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
@@ -223,3 +237,91 @@ def total_volume(body: Body) -> float:
     for t in range(body.n_tetrahedra):
         volume += tetrahedron_volume(body.rest, body.tetrahedra, t)
     return volume
+
+
+@inlined
+def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
+    """Return the pull of the springs on a node [N]: the sum of k (l - l0) along each."""
+    x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
+    fx = fy = fz = lanes(0.0)
+    slot = springs.first[node]
+    end = slot + springs.count[node]
+    while slot < end:
+        dx, dy, dz = eight_points(positions, springs.neighbour, slot)
+        dx, dy, dz = dx - x, dy - y, dz - z
+        length = square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
+        pull = load_lanes(springs.stiffness, slot) - load_lanes(springs.rest_pull, slot) / length
+        fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+        slot += WIDTH
+    return summed(fx, fy, fz)
+
+
+@inlined
+def damping_force(
+    springs: Springs,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float,
+) -> Point:
+    """Return the force of the dampers on a node [N]: retardation time times k l' along each spring.
+
+    Args:
+        springs: The rows.
+        node: The node.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        retardation_time: Viscosity per stiffness [s].
+    """
+    x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
+    u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
+    fx = fy = fz = lanes(0.0)
+    slot = springs.first[node]
+    end = slot + springs.count[node]
+    while slot < end:
+        dx, dy, dz = eight_points(positions, springs.neighbour, slot)
+        dx, dy, dz = dx - x, dy - y, dz - z
+        du, dv, dw = eight_points(velocities, springs.neighbour, slot)
+        approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
+        squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
+        pull = load_lanes(springs.stiffness, slot) * approach / squared
+        fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+        slot += WIDTH
+    return times(retardation_time, summed(fx, fy, fz))
+
+
+@inlined
+def elastic_and_damping_force(
+    springs: Springs,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float,
+) -> Point:
+    """Return the sum of `elastic_force` and `damping_force` [N], in one pass over the row.
+
+    Args:
+        springs: The rows.
+        node: The node.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        retardation_time: Viscosity per stiffness [s].
+    """
+    x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
+    u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
+    time, one = lanes(retardation_time), lanes(1.0)
+    fx = fy = fz = lanes(0.0)
+    slot = springs.first[node]
+    end = slot + springs.count[node]
+    while slot < end:
+        dx, dy, dz = eight_points(positions, springs.neighbour, slot)
+        dx, dy, dz = dx - x, dy - y, dz - z
+        du, dv, dw = eight_points(velocities, springs.neighbour, slot)
+        approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
+        inverse = one / square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
+        stiffness = load_lanes(springs.stiffness, slot)
+        pull = stiffness - load_lanes(springs.rest_pull, slot) * inverse
+        pull = pull + stiffness * (time * approach * inverse * inverse)
+        fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+        slot += WIDTH
+    return summed(fx, fy, fz)

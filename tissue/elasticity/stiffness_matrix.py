@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.elasticity.energy_density import OWN_SHARE
+from tissue.laws.energy_density import OWN_SHARE
 from tissue.material import Material
 from tissue.types import TetrahedralMesh
 
@@ -26,10 +26,6 @@ if TYPE_CHECKING:  # imported where it is used: it takes half a second
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 """Local nodes of a tetrahedron's edges."""
-
-LOCAL_DILATATION = 5.0 / 6.0
-"""Share of mu that the law of Smith, de Goes and Kim takes from the dilatation of the tetrahedron
-itself and adds to the averaged dilatation: the two cancel where dilatation is uniform."""
 
 
 class EdgeSprings(NamedTuple):
@@ -87,19 +83,20 @@ def stiffness_matrix(
         averaged: Whether dilatation is averaged over nodes, as in the engine; False for plain
             linear tetrahedra, which lock (for comparison).
     """
-    if material.law == "springs":
+    density = material.law.density(material.moduli)
+    if material.law.has_springs:
         springs = _of_springs(mesh, edge_springs(mesh, material.spring_modulus))
-        if material.volume_modulus == 0.0:
+        if density is None:
             return springs
         own = OWN_SHARE if averaged else 1.0
         mixed = own * _own_dilatation(mesh) + (1.0 - own) * _mean_dilatation(mesh)
         return springs + material.volume_modulus * mixed
+    assert density is not None  # without springs tetrahedra are elastic
     dilatation = _mean_dilatation if averaged else _own_dilatation
-    taken = 0.0 if material.stiffens else LOCAL_DILATATION * material.mu
     return (
         _of_shear(mesh, material.mu)
-        - taken * _own_dilatation(mesh)
-        + (material.lam + taken) * dilatation(mesh)
+        + (density.lam_of_tetrahedra - density.excess) * _own_dilatation(mesh)
+        + density.lam_of_nodes * dilatation(mesh)
     )
 
 

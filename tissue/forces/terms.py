@@ -31,7 +31,6 @@ from tissue.core.jit import kernel
 from tissue.core.simd import point_of, store_point
 from tissue.elasticity.collapse import add_collapse_forces, clear_collapse_forces, find_collapsing
 from tissue.elasticity.internal_forces import deform
-from tissue.elasticity.stiffening import stiffens
 from tissue.forces.acceleration import acceleration
 from tissue.forces.attachments import (
     add_attachment_forces,
@@ -42,6 +41,7 @@ from tissue.forces.fibres import add_caught_forces, slip_fibres
 from tissue.forces.geom_reactions import add_geom_reactions
 from tissue.forces.step_context import Instant, StepContext
 from tissue.forces.supports import add_support_work, support_force
+from tissue.laws.kernels import stiffens
 
 
 class TermEnergies(NamedTuple):

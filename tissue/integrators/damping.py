@@ -22,10 +22,9 @@ order below the motion itself.
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.core.vec3 import dot, vec3
-from tissue.elasticity.energy import dissipated_power
+from tissue.elasticity.energy import dissipated_power, relaxed_energy
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.neo_hookean import has_averaged_volumes
-from tissue.elasticity.stored_energy import relaxed_energy
 from tissue.elasticity.viscoelasticity import prepare_relaxation
 from tissue.forces.rigid_motion import add_rigid_part
 from tissue.forces.step_context import Damping, Stages, StepContext

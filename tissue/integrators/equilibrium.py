@@ -12,7 +12,7 @@ import numpy as np
 
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
-from tissue.elasticity.strained_frequency import StepLimit
+from tissue.elasticity.frequency.strained import StepLimit
 from tissue.forces.step_context import Increment
 from tissue.forces.terms import accelerations
 from tissue.integrators.equilibrium_checks import SupportConditions, fastest_node, gone_too_far

@@ -7,7 +7,8 @@ Another method that moves all nodes together needs a row and a choice here, its 
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, get_args
 
-from tissue.material import Law, Material
+from tissue.laws.law import Law
+from tissue.material import Material
 
 RUNGE_KUTTA: Final = 0
 """Number of the Runge-Kutta method on two levels, with damping in every stage."""
@@ -192,19 +193,19 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Global, "
             "Verlet or Hierarchical with settings"
         )
-    has_tetrahedra = material.law != "springs" or material.volume_modulus > 0.0
+    has_tetrahedra = not material.law.has_springs or material.volume_modulus > 0.0
     if isinstance(choice, Hierarchical) and has_tetrahedra:
         raise ValueError(
             "hierarchical relaxation moves one node at a time, on its springs alone; with law "
-            f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
-            "Choose law springs with poisson_ratio 0.25, or relaxation verlet, which is fast under "
-            "every law"
+            f"{material.law.name} and poisson_ratio {material.poisson_ratio} tetrahedra resist "
+            "too. Choose law springs with poisson_ratio 0.25, or relaxation verlet, which is fast "
+            "under every law"
         )
     if isinstance(choice, Verlet) and material.stiffens:
         raise ValueError(
-            f"relaxation verlet gains energy under law {material.law}: near a blade elements get "
-            "many times as stiff from one step to the next. Choose relaxation global, which does "
-            "not, or law neo_hookean"
+            f"relaxation verlet gains energy under law {material.law.name}: near a blade elements "
+            "get many times as stiff from one step to the next. Choose relaxation global, which "
+            "does not, or law neo_hookean"
         )
     return choice
 
@@ -216,7 +217,7 @@ def method_of(options: IntegratorOptions, law: Law) -> Method:
     """
     if isinstance(options, Verlet):
         return METHODS["verlet"]
-    usual = "stage" if law == "springs" else "step"
+    usual = "stage" if law.has_springs else "step"
     if isinstance(options, Global) and (options.damping or usual) == "step":
         return METHODS["nystroem"]
     return METHODS["runge_kutta"]

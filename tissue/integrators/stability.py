@@ -7,8 +7,8 @@ import numpy as np
 
 from tissue.core.jit import kernel
 from tissue.elasticity.internal_forces import Elastic, Surroundings
-from tissue.elasticity.stiffening import stiffens
 from tissue.integrators.methods import METHODS, RUNGE_KUTTA, SAFETY
+from tissue.laws.kernels import stiffens
 
 _LIMITS: Final = tuple(method.limit for method in METHODS.values())
 _SAFETY: Final = tuple(method.safety for method in METHODS.values())

@@ -14,10 +14,9 @@ from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.neo_hookean import keeps_gradients
-from tissue.elasticity.stiffening import stiffens
-from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import bound_of_terms, press_at_rest
 from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
@@ -40,6 +39,7 @@ from tissue.integrators.resting import (
     stop_nodes,
 )
 from tissue.integrators.stability import damping_rate, stable_step
+from tissue.laws.kernels import stiffens
 from tissue.mesh.bounding_boxes import largest_speed
 
 STEPS_BETWEEN_STRAIN_BOUNDS: Final = 2

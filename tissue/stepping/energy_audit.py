@@ -8,8 +8,7 @@ from tissue.blade.edge import Edge
 from tissue.blade.impulse_totals import clear_works
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.elasticity.energy import kinetic_energy, potential_energy
-from tissue.elasticity.internal_forces import elastic_energy
+from tissue.elasticity.energy import elastic_energy, kinetic_energy, potential_energy
 from tissue.forces.attachments import attached_energy
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms

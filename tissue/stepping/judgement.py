@@ -10,7 +10,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes, kernel
 from tissue.core.structs import Arrays, FloatCell
 from tissue.core.vec3 import dot, vec3
-from tissue.elasticity.internal_forces import elastic_energy
+from tissue.elasticity.energy import elastic_energy
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms
 from tissue.geometry.aabb import empty_box, with_point

@@ -1,7 +1,7 @@
 """The description of the tissue, names of scenes in it, and errors."""
 
 import re
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from bridge.link import SceneView, TissueDescription
 from bridge.tcp.messages.encoding import Count, FiniteFloat, Many, Message, Record
 from bridge.tcp.wire import MessageError
+from tissue import Material
 
 LARGEST_ERROR = 1 << 16
 """Largest error [byte]: text for a person to read."""
@@ -64,12 +65,36 @@ def _check_description(description: TissueDescription) -> None:
         raise MessageError("a view of the scene has a control character in its name")
 
 
+class _Material:
+    """A material: a map of its keys."""
+
+    type: Any = msgspec.defstruct(
+        "Material",
+        [
+            (name, tuple[tuple[float, float], ...] if name == "prony" else type(value), value)
+            for name, value in Material().as_keys().items()
+        ],
+    )
+
+    def plain(self, value: Material) -> Any:
+        """Return a map of the keys."""
+        return value.as_keys()
+
+    def value(self, plain: Any, lengths: dict[str, int]) -> Material:
+        """Return the material."""
+        try:
+            return Material.of_keys(msgspec.structs.asdict(plain))
+        except ValueError as error:
+            raise MessageError(str(error)) from error
+
+
 _Place = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 DESCRIPTION: Message[TissueDescription] = Message(
     Record(
         TissueDescription,
         scene=SentSceneName,
+        material=_Material(),
         bounds=(2, 3),
         n_tetrahedra=Count,
         n_nodes=Count,

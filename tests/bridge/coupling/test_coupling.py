@@ -11,9 +11,9 @@ from bridge.coupling.coupling import (
     MAX_PLAUSIBLE_FORCE,
     MAX_PLAUSIBLE_SPEED,
     Coupling,
-    DeviceLimits,
     expect_plausible_motion,
 )
+from bridge.coupling.limits import DeviceLimits
 from bridge.coupling.passivity import Travel
 from bridge.poses import six
 from tissue import Wrench

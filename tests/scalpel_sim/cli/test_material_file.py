@@ -58,7 +58,7 @@ def options(path, *, blade=None, **given) -> TissueOptions:
 
 
 def test_the_tables_have_the_fields_of_material_and_blade():
-    assert set(MaterialTable.__struct_fields__) == {field.name for field in fields(Material)}
+    assert set(MaterialTable.__struct_fields__) == set(Material().as_keys())
     in_degrees = {field.name for field in fields(BladeShape)} - {"bevel_angle"}
     assert set(BladeTable.__struct_fields__) == in_degrees | {"bevel_degrees"}
     for table in (MaterialTable, BladeTable):
@@ -186,7 +186,7 @@ def test_an_option_overrides_the_file(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('[material]\nlaw = "springs"\npoisson_ratio = 0.1\ntoughness = 7\n')
     scene = chosen_scene("slab", options(path, law="neo_hookean", toughness=9.0))
-    assert (scene.material.law, scene.material.poisson_ratio) == ("neo_hookean", 0.1)
+    assert (scene.material.law.name, scene.material.poisson_ratio) == ("neo_hookean", 0.1)
     assert scene.material.toughness == 9.0
 
 

@@ -9,7 +9,7 @@ from tests.support import bodies, incisions, strokes
 from tests.support.materials import SPRINGS
 from tests.tissue.kernels_of import row, springs_of
 from tissue import Material, SolverSettings, Tissue, block
-from tissue.elasticity.internal_forces import elastic_energy
+from tissue.elasticity.energy import elastic_energy
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 SLAB = (0.04, 0.08, 0.02)

@@ -9,7 +9,6 @@ from tests.tissue.kernels_of import cut_of, springs_of
 from tests.tissue.solids import LAWS, built, law_of, moved, solid_of
 from tissue import block
 from tissue.core.simd import WIDTH
-from tissue.elasticity.energy_density import neo_hookean, volume_term
 from tissue.elasticity.finite_elements import (
     STAR_POOL_MARGIN,
     VOLUME,
@@ -22,7 +21,8 @@ from tissue.elasticity.finite_elements import (
     shape_place,
     tetrahedron_of_slot,
 )
-from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
+from tissue.laws.energy_density import neo_hookean, volume_term
 from tissue.mesh.changes import clear_changes, touched_nodes
 from tissue.mesh.star import LARGEST_STAR, no_visits
 

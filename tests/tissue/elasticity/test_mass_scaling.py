@@ -7,9 +7,8 @@ from tests.support import bodies, incisions, strokes
 from tests.support.materials import SPRINGS
 from tests.tissue.solids import SolidBody, highest_frequency, moved
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
-from tissue.elasticity.limited_frequency import limited_frequency
+from tissue.elasticity.frequency.strained import StepLimit, limited_frequency
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP
-from tissue.elasticity.strained_frequency import StepLimit
 from tissue.forces.terms import accelerations
 
 MESH = block((6, 6, 3), (0.06, 0.06, 0.03))

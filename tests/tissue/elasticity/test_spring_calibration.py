@@ -53,7 +53,7 @@ def test_calibrated_springs_have_the_requested_modulus(mesh, nu):
     material = calibrated(mesh, replace(SPRINGS, young_modulus=12e3, poisson_ratio=nu))
     assert material.young_modulus == 12e3
     assert spring_error(mesh, material).relaxed.young_modulus == pytest.approx(12e3, rel=1e-4)
-    assert 0.7 < material.spring_calibration < 1.3
+    assert 0.7 < material.law.calibration < 1.3
 
 
 def test_a_law_without_springs_is_not_calibrated():

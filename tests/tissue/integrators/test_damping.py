@@ -14,7 +14,7 @@ from tests.tissue.integrators.test_runge_kutta import (
 )
 from tests.tissue.kernels_of import elastic_of, network_of, oscillator
 from tissue import block
-from tissue.elasticity.internal_forces import elastic_energy
+from tissue.elasticity.energy import elastic_energy
 from tissue.integrators.damping import LONGEST_INTERVAL
 from tissue.integrators.methods import METHODS
 from tissue.integrators.stability import DAMPING_LIMIT

@@ -8,7 +8,7 @@ from tests.tissue.integrators.test_runge_kutta import order
 from tests.tissue.kernels_of import elastic_of, network_of
 from tissue import block
 from tissue.core.jit import is_compiling
-from tissue.elasticity.internal_forces import elastic_energy
+from tissue.elasticity.energy import elastic_energy
 from tissue.integrators.methods import METHODS, VERLET
 
 MESH = block((3, 2, 2), (0.06, 0.04, 0.04))

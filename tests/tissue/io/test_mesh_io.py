@@ -9,7 +9,7 @@ import pytest
 from tests.tissue.io import mesh_writers as write
 from tissue import Snapshot, TetrahedralMesh, block, read_mesh, write_vtu
 from tissue.boundary_conditions import side_nodes
-from tissue.io.mesh_io import MeshError
+from tissue.mesh.mesh_arrays import MeshError
 
 BLOCK = block((2, 1, 2), (0.03, 0.02, 0.01))
 

@@ -42,8 +42,7 @@ from tissue.core.simd import (
     times,
 )
 from tissue.core.structs import Arrays, IntCell
-from tissue.elasticity.spring_forces import NO_LENGTH
-from tissue.elasticity.springs import Springs
+from tissue.elasticity.springs import NO_LENGTH, Springs
 from tissue.forces.step_context import StepContext
 from tissue.integrators.bielser_1998.rings import Rings, ring_of
 from tissue.mesh.body import Body, grown

@@ -1,15 +1,21 @@
-"""The bounds on the frequencies of nodes whose tetrahedra a cut changed, and the mass they get."""
+"""The bounds on frequencies after a change, and the mass that nodes get and give back.
+
+A cut changes the tetrahedra of nodes: those that it makes too fast get mass. What nodes get between
+cuts (`tissue.elasticity.frequency.strained.limited_frequency`) they give back when the blade has
+left an incision. Otherwise each stroke would leave nodes heavier that nothing strains or holds any
+more, until the body has all the mass that it may get and its steps become shorter.
+"""
 
 import math
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.elasticity.frequency_bound import bound_solid_frequencies
-from tissue.elasticity.frequency_refinement import tighten
+from tissue.core.vec3 import dot, vec3
+from tissue.elasticity.frequency.at_rest import bound_solid_frequencies, tighten
+from tissue.elasticity.frequency.strained import bound_tetrahedra, forget_tests
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.mass_scaling import LIMIT_STEP, MassScaling, scale_masses
 from tissue.elasticity.springs import bound_frequencies
-from tissue.elasticity.tested_frequency import bound_tetrahedra, forget_tests
 from tissue.mesh.body import Body
 from tissue.mesh.changes import largest_frequency
 from tissue.mesh.star import Visits
@@ -69,3 +75,34 @@ def _raise_limit(elastic: Elastic, body: Body) -> None:
     while scaling.added > scaling.most:
         scaling.allowed *= LIMIT_STEP**2
         scaling.added += scale_masses(body, springs, solid, every, n, scaling.allowed)
+
+
+@kernel
+def return_mass(elastic: Elastic, body: Body, every: IntArray) -> None:
+    """Take back mass that nodes do not need at rest; what it moved with is counted as lost.
+
+    Nodes keep their velocities, and with them the momentum of their own mass.
+
+    Args:
+        elastic: The bounds of nodes, and what they have got; written.
+        body: Masses are written.
+        every: The numbers from 0 on, at least as many as there are nodes.
+    """
+    scaling, n = elastic.scaling, body.n_nodes
+    before = _energy_of_added_mass(body)
+    scaling.added += scale_masses(body, elastic.springs, elastic.solid, every, n, scaling.allowed)
+    scaling.lost += before - _energy_of_added_mass(body)
+    bound_frequencies(body, elastic.springs, every, n)
+    bound_both_frequencies(elastic, every, n)
+    bound_tetrahedra(elastic, body, every, n)
+    forget_tests(elastic.solid, every, n)
+
+
+@kernel
+def _energy_of_added_mass(body: Body) -> float:
+    """Return the kinetic energy of the mass that was added [J]."""
+    energy = 0.0
+    for node in range(body.n_nodes):
+        v = vec3(body.velocities, node)
+        energy += 0.5 * body.added_masses[node] * dot(v, v)
+    return energy

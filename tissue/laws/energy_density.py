@@ -2,6 +2,10 @@
 
 from tissue.core.structs import Arrays
 
+NEO_HOOKEAN, EXPONENTIAL, POLYNOMIAL = 0.0, 1.0, 2.0
+"""Forms of the shear term, between which `tissue.laws.kernels` branches. A number in a struct of
+arrays that does not change is a float."""
+
 OWN_SHARE = 0.2
 """Share of the volume term beside springs that acts on each tetrahedron by itself. Where one
 tetrahedron folds while its neighbours swell, averaged volumes do not change, and springs resist
@@ -14,7 +18,7 @@ class EnergyDensity(Arrays):
     """Energy per volume at rest: stable neo-Hookean (Smith, de Goes and Kim 2018), or stiffening.
 
     W = mu/2 (|F|^2 - 3) - mu/2 log(|F|^2 + 1) + lam/2 (J - a)^2
-    W = mu/2 w(|F|^2 - 1 - 2 J) + lam/2 (J - a)^2     (`tissue.elasticity.stiffening`)
+    W = mu/2 w(|F|^2 - 1 - 2 J) + lam/2 (J - a)^2     (`tissue.laws.kernels`)
 
     It is defined for J <= 0 as well: an inverted tetrahedron recovers. J of the last term is that
     of each tetrahedron, or the average over the tetrahedra around each node (Bonet and Burton
@@ -34,12 +38,12 @@ class EnergyDensity(Arrays):
     """Shear modulus at small strain [Pa]."""
     excess: float
     """What the parts of lam have more than Lame's constant, for the shear term has less [Pa]."""
-    exponent: float
-    """b of the exponential law; 0 under another law."""
+    form: float
+    """Form of the shear term."""
+    first: float
+    """First number of the form: b of the exponential, c2 of the polynomial."""
     second: float
-    """Ratio c2 of Yeoh's law; 0 under another law."""
-    third: float
-    """Ratio c3 of Yeoh's law; 0 under another law."""
+    """Second number of the form: c3 of the polynomial."""
 
 
 def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensity:
@@ -60,24 +64,34 @@ def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensit
         a=a,
         shear_modulus=mu,
         excess=5.0 / 6.0 * mu,
-        **_NOT_STIFFENING,
+        form=NEO_HOOKEAN,
+        first=0.0,
+        second=0.0,
     )
 
 
-def stiffening(
-    mu: float, lam: float, *, exponent: float = 0.0, second: float = 0.0, third: float = 0.0
-) -> EnergyDensity:
-    """Return a law of `tissue.elasticity.stiffening` with the small-strain moduli `mu` and `lam`.
+def exponential(mu: float, lam: float, b: float) -> EnergyDensity:
+    """Return the exponential law with the small-strain moduli `mu` and `lam` (Lame's) [Pa]."""
+    return _stiffening(mu, lam, EXPONENTIAL, b, 0.0)
+
+
+def polynomial(mu: float, lam: float, c2: float, c3: float = 0.0) -> EnergyDensity:
+    """Return the law w = q + c2 q^2 + c3 q^3 with the small-strain moduli `mu` and `lam` [Pa].
+
+    Args:
+        mu: Shear modulus.
+        lam: Lame's first constant.
+        c2: Ratio of the second to the first coefficient, not negative.
+        c3: Ratio of the third to the first coefficient, not negative.
+    """
+    return _stiffening(mu, lam, POLYNOMIAL, c2, c3)
+
+
+def _stiffening(mu: float, lam: float, form: float, first: float, second: float) -> EnergyDensity:
+    """Return a law that stiffens, of a form with these numbers.
 
     The part of the volume term that the shear term cancels at small strain acts on each
     tetrahedron, as the shear does.
-
-    Args:
-        mu: Shear modulus [Pa].
-        lam: Lame's first constant [Pa].
-        exponent: b of the exponential law.
-        second: c2 of Yeoh's law.
-        third: c3 of Yeoh's law.
     """
     return EnergyDensity(
         mu=mu,
@@ -86,9 +100,9 @@ def stiffening(
         a=1.0,
         shear_modulus=mu,
         excess=mu,
-        exponent=exponent,
+        form=form,
+        first=first,
         second=second,
-        third=third,
     )
 
 
@@ -107,8 +121,7 @@ def volume_term(modulus: float, *, averaged: bool = True) -> EnergyDensity:
         a=1.0,
         shear_modulus=0.0,
         excess=0.0,
-        **_NOT_STIFFENING,
+        form=NEO_HOOKEAN,
+        first=0.0,
+        second=0.0,
     )
-
-
-_NOT_STIFFENING = {"exponent": 0.0, "second": 0.0, "third": 0.0}

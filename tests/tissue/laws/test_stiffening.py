@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from tests.support import bodies
 from tests.tissue.solids import lame, solid_of
-from tissue.elasticity.energy_density import stiffening
-from tissue.elasticity.stiffening import LARGEST_EXPONENT, exponential_less_one
+from tissue.laws.energy_density import exponential, polynomial
+from tissue.laws.kernels import LARGEST_EXPONENT, exponential_less_one
 
 pytestmark = pytest.mark.kernel
 
@@ -16,9 +16,9 @@ MU, LAM = lame(0.49995)
 
 FORMULAS = {
     # -(dW/dI1) / mu of the papers, at I1 - 3
-    "exponential": (stiffening(MU, LAM, exponent=1.5), lambda i: 0.5 * np.exp(1.5 * i)),
+    "exponential": (exponential(MU, LAM, 1.5), lambda i: 0.5 * np.exp(1.5 * i)),
     "yeoh": (
-        stiffening(MU, LAM, second=0.3, third=0.1),
+        polynomial(MU, LAM, 0.3, 0.1),
         lambda i: 0.5 * (1.0 + 2.0 * 0.3 * i + 3.0 * 0.1 * i**2),
     ),
 }

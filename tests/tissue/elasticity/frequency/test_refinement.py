@@ -6,7 +6,7 @@ import pytest
 from tests.support import bodies
 from tests.tissue.solids import LAWS, highest_frequency, law_of, solid_of
 from tissue import block
-from tissue.elasticity.frequency_refinement import tighten
+from tissue.elasticity.frequency.at_rest import tighten
 from tissue.mesh.star import no_visits
 
 pytestmark = pytest.mark.kernel

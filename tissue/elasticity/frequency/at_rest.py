@@ -9,10 +9,18 @@ Added up over all energies that leaves a 3 x 3 matrix N_b at each node b, and th
 sum u_b . N_b u_b: no mode is faster than the largest w^2 = |N_b| / m_b. It is Irons' theorem for
 point masses, with the mass of a node shared among the elements around it.
 
-With r_a = |L_a| / sqrt(m_a) the bound is 10 to 45 % above the truth on meshes after cuts;
-`tissue.elasticity.frequency_refinement` finds better r_a where it is highest. The bound of each
-tetrahedron by itself with a quarter of its own mass, 2 c_p sqrt(sum of 1 / altitude^2), is up to 7
-times above: a sliver has next to no mass, but it shares its nodes with tetrahedra that have.
+With r_a = |L_a| / sqrt(m_a) the bound is 10 to 45 % above the truth on meshes after cuts. The
+bound of each tetrahedron by itself with a quarter of its own mass, 2 c_p sqrt(sum of 1 /
+altitude^2), is up to 7 times above: a sliver has next to no mass, but it shares its nodes with
+tetrahedra that have.
+
+Better weights bring it near the truth where it is highest (`tighten`). It holds for any positive
+weights x of the nodes, as the largest ratio (B x)_b / x_b does for a matrix B without negative
+entries, whose own largest eigenvalue is the least such ratio (Collatz and Wielandt). The power
+iteration x <- B x lowers the ratio in each round. Here only nodes near the worst take part, since
+the others do not limit the time step. A fast mode is concentrated on one or two nodes, which get a
+larger weight than by their mass. On an organ after cuts that lowers the bound from 1.28 to 1.06
+times the highest frequency.
 
 A fixed node does not move: it counts as infinitely heavy.
 """
@@ -31,8 +39,8 @@ from tissue.elasticity.finite_elements import (
     rest_normals,
     tetrahedron_of_slot,
 )
-from tissue.elasticity.stiffening import stiffens
 from tissue.geometry.tetrahedron import add_square, largest_eigenvalue, nothing_symmetric
+from tissue.laws.kernels import stiffens
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
@@ -41,6 +49,18 @@ STALE = 2.0
 gives a bound, and that of the mass now is near the best; but another weight changes the bound two
 rings further. If weights never change, nodes that were split several times, or were given a larger
 weight for a neighbour that is gone, make the bound twice too high."""
+
+
+ROUNDS = 6
+"""Rounds at most. In the organ the result is within 2 % of the least possible bound."""
+
+NEAR_WORST = 0.64
+"""Share of the highest bound on w^2 above which a node gets another weight. Nearer to 1 takes more
+rounds, further from it more nodes."""
+
+WORTH_IT = 0.98
+"""Ratio of the highest bound on w^2 after and before a round above which the round is the last: in
+a regular mesh all nodes are alike, and there is nothing to gain."""
 
 
 @kernel
@@ -224,7 +244,7 @@ def bounds_of_node(
     """Return the bounds on w^2 at a node with its tetrahedra deformed.
 
     The shear part of the law is taken at rest; under a law that stiffens with the modulus
-    `solid.stiffening` and its slope (`tissue.elasticity.quick_frequency`).
+    `solid.stiffening` and its slope (`tissue.elasticity.frequency.quick`).
 
     Args:
         solid: Weights and the row of the node.
@@ -299,3 +319,47 @@ def _stretched(body: Body, points: FloatArray, t: int, a: Vec3) -> Vec3:
     total = axpy(dot(n2, a), sub(vec3(points, body.tetrahedra[t, 2]), x0), total)
     total = axpy(dot(n3, a), sub(vec3(points, body.tetrahedra[t, 3]), x0), total)
     return scale(1.0 / (6.0 * volume), total)
+
+
+@kernel
+def tighten(solid: Solid, body: Body, visits: Visits, n_listed: int, allowed: float) -> int:
+    """Change the weights of the worst nodes of `solid.listed` until their bounds are `allowed`.
+
+    Args:
+        solid: Weights and bounds are written.
+        body: For the masses.
+        visits: For searches.
+        n_listed: Nodes listed; the bound of other nodes is not above `allowed`.
+        allowed: Bound on w^2 that the rest of the body has [1/s2]; lower bounds are of no use.
+
+    Returns:
+        Length of `solid.listed` with all nodes whose bound has changed.
+    """
+    listed, raised = solid.listed, solid.raised
+    worst = _worst(solid, n_listed)
+    for _ in range(ROUNDS):
+        if worst <= allowed:
+            break
+        threshold = max(NEAR_WORST * worst, allowed)
+        n = 0
+        for i in range(n_listed):
+            node = listed[i]
+            if solid.frequency_squared[node] > threshold:
+                solid.weight[node] *= solid.frequency_squared[node] / threshold
+                raised[n] = node
+                n += 1
+        n = bound_around(solid, body, visits, raised, with_neighbours(solid, visits, raised, n))
+        n_listed = with_these(visits, listed, n_listed, raised, n)
+        before, worst = worst, _worst(solid, n_listed)
+        if worst > WORTH_IT * before:
+            break
+    return n_listed
+
+
+@kernel
+def _worst(solid: Solid, n_listed: int) -> float:
+    """Return the highest bound on w^2 of the listed nodes [1/s2]."""
+    worst = 0.0
+    for i in range(n_listed):
+        worst = max(worst, solid.frequency_squared[solid.listed[i]])
+    return worst

@@ -8,11 +8,16 @@ from tests.tissue.solids import LAWS, SolidBody, highest_frequency, law_of, soli
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.collapse import no_collapse
+from tissue.elasticity.frequency.strained import (
+    FURTHER,
+    StepLimit,
+    bound_tetrahedra,
+    forget_tests,
+    strained_frequency,
+)
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import no_mass_scaling
 from tissue.elasticity.springs import no_springs
-from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
-from tissue.elasticity.tested_frequency import FURTHER, bound_tetrahedra, forget_tests
 from tissue.mesh.star import no_visits
 
 pytestmark = pytest.mark.kernel
