@@ -11,8 +11,8 @@ from tissue.fields.node_stress import von_mises_stresses
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.faces import boundary_nodes
 from tissue.mesh.pieces import label_pieces
-from tissue.mesh.surface import boundary_nodes
 from tissue.types import Chunks, Snapshot, SurfaceQuantity
 
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
-from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
 from tissue.blade.edge import NOWHERE
+from tissue.blade.edge_anchors import Anchors, new_anchors
 from tissue.contact.geoms.geom_contact import no_geoms
 from tissue.contact.response.contacts import new_penalty_forces
 from tissue.core.thread_team import new_team
@@ -36,10 +36,9 @@ from tissue.integrators.step_context import StepContext
 from tissue.integrators.substeps import damp
 from tissue.integrators.support_state import supports_at_rest
 from tissue.mesh.body import Body, build_body, grown_body
-from tissue.mesh.changes import new_change
-from tissue.mesh.loose_pieces import no_loose_pieces
+from tissue.mesh.changes import SPARE_NODES, new_change
+from tissue.mesh.pieces import no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, no_visits
-from tissue.mesh.workspace import SPARE_NODES
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
 

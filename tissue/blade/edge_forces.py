@@ -1,6 +1,14 @@
 """Forces of the cutting edge on the nodes."""
 
-from tissue.blade.anchors import (
+from tissue.blade.blade_state import (
+    BladeState,
+    add_reaction,
+    add_to_node,
+    running_totals,
+    store_totals,
+)
+from tissue.blade.edge import BladeMotion, displacement_of
+from tissue.blade.edge_anchors import (
     ANCHORED,
     anchor_position,
     holding_node,
@@ -9,9 +17,6 @@ from tissue.blade.anchors import (
     pulling_point,
     surplus_stretch,
 )
-from tissue.blade.blade_state import BladeState
-from tissue.blade.edge import BladeMotion, displacement_of
-from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3

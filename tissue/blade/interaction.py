@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tissue.blade.anchors import anchor_stiffness, is_engaged, new_anchors
 from tissue.blade.blade_context import (
     GRID_IS_FULL,
     NO_ROOM_FOR_FACES,
@@ -18,13 +17,14 @@ from tissue.blade.blade_context import (
     update_faces,
 )
 from tissue.blade.blade_state import new_blade_state
-from tissue.blade.blunt_contact import new_blunt_contacts
-from tissue.blade.blunt_search import relocate_blunt_sides
 from tissue.blade.edge import NOWHERE, Edge
+from tissue.blade.edge_anchors import anchor_stiffness, is_engaged, new_anchors
+from tissue.blade.faces_contact import grown_side_contacts, with_more_faces
+from tissue.blade.faces_search import forget_cells, forget_changed_faces
 from tissue.blade.forces import begin_blade_step, release_edge
 from tissue.blade.return_mapping import relocate
-from tissue.blade.side_contact import grown_side_contacts, with_more_faces
-from tissue.blade.side_search import forget_cells, forget_changed_faces
+from tissue.blade.spine_contact import new_blunt_contacts
+from tissue.blade.spine_search import relocate_blunt_sides
 from tissue.blade.toughness import toughness_law_of
 from tissue.blade.wrench import BladeReport, WrenchReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
@@ -34,7 +34,7 @@ from tissue.cutting.blade_path import Path
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.moved_nodes import Moved, forget_moved
+from tissue.mesh.node_motion import Moved, forget_moved
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import build_grid, no_grid
 from tissue.types import RigidContacts
@@ -192,7 +192,7 @@ class BladeInteraction:
             bounds: Lowest and highest corner of a box around the tissue [m], shape (2, 3). They,
                 and the distance below, are the same for all steps.
             slit_reach: Distance from a cut face up to which a point is in the slit [m]
-                (`tissue.blade.engagement.is_in_slit`).
+                (`tissue.blade.edge_search.is_in_slit`).
         """
         context = self._context
         if (

@@ -6,15 +6,15 @@ the body or at a real end of the blade; their offset from the anchored neighbour
 blade.
 """
 
-from tissue.blade.anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
 from tissue.blade.blade_state import BladeState
+from tissue.blade.body_sheets import join_wall, rotation_of_wall
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement
+from tissue.blade.edge_anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
 from tissue.blade.material_frame import find_walls, rest_offset
-from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, note_way
-from tissue.geometry.polar_decomposition import apply_transposed
+from tissue.geometry.rotations import apply_transposed
 from tissue.mesh.body import OUTER, Body, walk
 
 OUTREACH = 6

@@ -9,24 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.anchors import ANCHORED, anchor_position, pulling_point, surplus_stretch
-from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import (
-    PRESSING,
-    blunt_side,
-    press_force,
-    press_of,
-    touched_point,
-)
+from tissue.blade.blade_state import BladeState, ImpulseTotals
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
-from tissue.blade.impulse_totals import ImpulseTotals
-from tissue.blade.side_contact import (
+from tissue.blade.edge_anchors import ANCHORED, anchor_position, pulling_point, surplus_stretch
+from tissue.blade.faces_contact import (
     POINTS,
     contact_forces,
     contact_point,
     corners_of,
     is_clear,
     penetration,
+)
+from tissue.blade.spine_contact import (
+    PRESSING,
+    blunt_side,
+    press_force,
+    press_of,
+    touched_point,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel

@@ -16,13 +16,15 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.attributes import attributes_of, set_attributes
-from tissue.core.memory_blocks import PackedMemory, packed, unpacked
-from tissue.core.struct_memory import (
+from tissue.core.memory_blocks import (
+    PackedMemory,
     StructMemory,
     StructPart,
     StructRules,
     memory_of,
+    packed,
     parts_of,
+    unpacked,
 )
 from tissue.core.structs import Arrays, Vectors
 

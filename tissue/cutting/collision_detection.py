@@ -14,7 +14,7 @@ from tissue.core.hash_table import (
     is_filled,
 )
 from tissue.core.jit import kernel
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.cutting.blade_path import Path, put_on_lattice
 from tissue.cutting.cut_surface import on_sheet

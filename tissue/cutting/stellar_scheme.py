@@ -5,15 +5,20 @@ that then tile the sheet are cut; nodes whose stars fell apart are doubled. Ther
 cases, so that no case is missing: cuts may cross, turn back and join.
 """
 
+from typing import Final
+
 import numpy as np
 
-from tissue.core.jit import SameTypes
+from tissue.core.jit import SameTypes, kernel
 from tissue.cutting.blade_path import Path
+from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
-from tissue.cutting.cut_pass import ALONG_PATH, TO_EDGE, TO_THE_END, cut_in_a_pass
+from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
 from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
 from tissue.cutting.finishing import finish_sheet
 from tissue.cutting.minimum_cut import new_flow_graph
+from tissue.cutting.separation import close_sheet, open_sheet
+from tissue.cutting.snapping import insert_crossings
 from tissue.cutting.workspace import (
     Cut,
     SnapLimits,
@@ -25,13 +30,40 @@ from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
+ALONG_PATH: Final = 0
+"""Cut what was detected along the path of the edge."""
+
+TO_EDGE: Final = 1
+"""Cut up to the edge itself, which rests."""
+
+TO_THE_END: Final = 2
+"""Cut what remains when the blade has left the incision."""
+
+
+@kernel
+def cut_in_a_pass(cut: Cut, how_far: int) -> None:
+    """Cut what was detected, as far as there is room; `how_far`: one of the constants above."""
+    clear_changes(cut.change)
+    if how_far == TO_EDGE:
+        bring_front_to_blade(cut)
+    else:
+        insert_crossings(cut)
+        extend_fronts(cut)
+    resolve_bridges(cut)
+    if how_far == TO_THE_END:
+        close_sheet(cut)
+    else:
+        open_sheet(cut)
+    remember_active(cut)
+
+
 _DETECT, _CUT = SameTypes(detect_collisions), SameTypes(cut_in_a_pass)
 
 
 class StellarScheme:
     """Our scheme, with sheet, changes and scratch of the current incision.
 
-    The methods are those of `tissue.cutting.scheme.Scheme`.
+    The methods are those of `tissue.cutting.incision.Scheme`.
 
     Args:
         limits: When a node that is there is used in place of a new one.

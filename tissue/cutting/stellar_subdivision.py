@@ -14,9 +14,8 @@ from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import local_index
-from tissue.mesh.changes import note_child, note_dirty
+from tissue.mesh.changes import PASS_NODES, SPARE_NODES, note_child, note_dirty
 from tissue.mesh.star import edge_star
-from tissue.mesh.workspace import PASS_NODES, SPARE_NODES
 
 NO_ROOM = -1
 """Returned in place of a node where the arrays must grow first."""

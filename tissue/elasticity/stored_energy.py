@@ -19,9 +19,8 @@ dissipated are estimates; their sum is exact.
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import alike, load_block, sum_of_lanes, width_of
-from tissue.core.simd_gather import larger
-from tissue.core.simd_logarithm import logarithm
+from tissue.core.simd_blocks import alike, load_block, logarithm, sum_of_lanes, width_of
+from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, n_blocks
 from tissue.elasticity.neo_hookean import (

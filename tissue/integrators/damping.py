@@ -15,7 +15,7 @@ the kinetic energy is what the dampers dissipate, so that no integral of a power
 
 from tissue.core.jit import kernel
 from tissue.core.simd import point, point_of, store_point, times
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import Elastic, viscous_force

@@ -10,7 +10,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.integrators.model import TissueModel
 from tissue.integrators.own_weight import OwnWeight, expect_bearable, own_weight
 from tissue.material import Material
-from tissue.mesh.loose_pieces import loose_pieces_of
+from tissue.mesh.pieces import loose_pieces_of
 from tissue.types import TissueError
 
 BALANCED = 1e-9

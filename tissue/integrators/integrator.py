@@ -10,7 +10,7 @@ from tissue.integrators.options import Hierarchical, IntegratorOptions
 from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.moved_nodes import Moved
+from tissue.mesh.node_motion import Moved
 
 
 class Integrator(Protocol):

@@ -6,7 +6,7 @@ support moves, a load acts or its mesh changes.
 
 import math
 
-from tissue.blade.anchors import is_engaged
+from tissue.blade.edge_anchors import is_engaged
 from tissue.contact.response.forces import add_contact_forces, end_contact_substep
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel

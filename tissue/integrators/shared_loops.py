@@ -4,7 +4,6 @@ Every loop writes one row for each of its items, from what loops before it wrote
 So its result does not depend on who runs which part of it (`tissue.core.thread_team`).
 """
 
-from tissue.core.atomics import pause
 from tissue.core.jit import kernel
 from tissue.core.thread_team import (
     claim_first,
@@ -12,6 +11,7 @@ from tissue.core.thread_team import (
     end_chunk,
     items_of,
     open_loop,
+    pause,
     wait_for_others,
 )
 from tissue.elasticity.finite_elements import n_blocks

@@ -9,8 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from tissue.blade.blade_mass import limit_frequency_at_blade
-from tissue.blade.forces import frequency_with_blade
+from tissue.blade.forces import frequency_with_blade, limit_frequency_at_blade
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times

@@ -14,7 +14,7 @@ from tissue.integrators.damping import Damping
 from tissue.integrators.stages import Stages
 from tissue.integrators.support_state import Supports
 from tissue.mesh.body import Body
-from tissue.mesh.loose_pieces import LoosePieces
+from tissue.mesh.pieces import LoosePieces
 from tissue.mesh.star import Visits
 
 

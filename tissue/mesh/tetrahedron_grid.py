@@ -13,8 +13,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, aligned
-from tissue.core.simd_gather import larger_bits
-from tissue.core.simd_rows import rows_of_three
+from tissue.core.simd_rows import larger_bits, rows_of_three
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import vec3
 from tissue.geometry.aabb import tetrahedron_box, widened

@@ -7,7 +7,7 @@ What is not named here is state as a whole. What is named saves time: the arrays
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from tissue.core.struct_memory import RowsInUse, StructRules
+from tissue.core.memory_blocks import RowsInUse, StructRules
 from tissue.core.structs import Arrays
 
 SCRATCH = frozenset(

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.blade.blade_state import clear_works
 from tissue.blade.edge import Edge
+from tissue.blade.faces_contact import sides_energy
 from tissue.blade.forces import edge_energy
-from tissue.blade.impulse_totals import clear_works
-from tissue.blade.side_contact import sides_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.elasticity.energy import kinetic_energy, potential_energy

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from tissue.blade.edge import Edge
+from tissue.blade.faces_contact import sides_energy
 from tissue.blade.forces import edge_energy
-from tissue.blade.side_contact import sides_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes, kernel
 from tissue.core.structs import Arrays, FloatCell
@@ -17,7 +17,7 @@ from tissue.geometry.aabb import empty_box, with_point
 from tissue.integrators.attachments import attached_energy
 from tissue.integrators.model import TissueModel
 from tissue.integrators.step_context import StepContext
-from tissue.mesh.finite_motion import is_motion_finite
+from tissue.mesh.node_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
 """Energy that may come out of nothing, as a strain of the whole body: a tenth of the speed of waves

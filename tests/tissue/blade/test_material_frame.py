@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tissue import block
-from tissue.blade.anchors import new_anchors
+from tissue.blade.edge_anchors import new_anchors
 from tissue.blade.material_frame import BESIDE, way_at_rest
 from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3

@@ -6,7 +6,7 @@ import pytest
 from tests.support import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue import block
-from tissue.blade.prescribed_path import begin_path, prescribe_path
+from tissue.blade.prescribed_cut import begin_path, prescribe_path
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import resampled
 from tissue.mesh.tetrahedron_grid import build_grid

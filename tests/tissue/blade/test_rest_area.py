@@ -5,10 +5,9 @@ import pytest
 
 from tests.tissue.kernels_of import line_blade
 from tissue import Material, block
-from tissue.blade.anchors import held_toughness, new_anchors
 from tissue.blade.edge import Edge, pose_at
-from tissue.blade.rest_area import AVERAGED_OVER, LARGEST_SHARE, update_rest_share
-from tissue.blade.return_mapping import set_anchor
+from tissue.blade.edge_anchors import held_toughness, new_anchors
+from tissue.blade.return_mapping import AVERAGED_OVER, LARGEST_SHARE, set_anchor, update_rest_share
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import build_body
 

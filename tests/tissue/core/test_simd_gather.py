@@ -5,7 +5,7 @@ import pytest
 
 from tissue.core.jit import kernel
 from tissue.core.simd import load_lanes
-from tissue.core.simd_gather import (
+from tissue.core.simd_rows import (
     first_bit,
     larger_bits,
     natural,

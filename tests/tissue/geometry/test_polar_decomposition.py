@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue.core.vec3 import Vec3
-from tissue.geometry.polar_decomposition import IDENTITY, apply_transposed, nearest_rotation
+from tissue.geometry.rotations import IDENTITY, apply_transposed, nearest_rotation
 from tissue.geometry.tetrahedron import Matrix3
 
 pytestmark = pytest.mark.kernel

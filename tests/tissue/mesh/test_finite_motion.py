@@ -5,7 +5,7 @@ import pytest
 
 from tests.support import bodies
 from tissue.mesh.body import build_body
-from tissue.mesh.finite_motion import is_motion_finite
+from tissue.mesh.node_motion import is_motion_finite
 
 MESH = bodies.jittered(2, 0)
 N = len(MESH.positions)

@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue import TetrahedralMesh, block
 from tissue.mesh.body import build_body
-from tissue.mesh.loose_pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
+from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 
 CELL = block((1, 1, 1), (0.01,) * 3)
 N = len(CELL.positions)

@@ -6,7 +6,7 @@ from tests.support import bodies
 from tests.tissue.io import mesh_writers
 from tissue import TetrahedralMesh, read_mesh
 from tissue.io import mesh_io
-from tissue.mesh.node_order import renumbered
+from tissue.io.mesh_io import renumbered
 
 
 def shuffled(mesh):

@@ -10,8 +10,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.cutting.bielser_1998.case_table import LOOKUP
-from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES, bit_of
-from tissue.cutting.bielser_1998.template_1_to_17 import PRESPLIT
+from tissue.cutting.bielser_1998.template_1_to_17 import EDGES, FACES, PRESPLIT, bit_of
 from tissue.mesh.body import Body
 from tissue.mesh.faces import sorted_faces
 from tissue.mesh.nonconforming import may_hang

@@ -1,8 +1,8 @@
 """The focus of the relaxation, where the tip of the blade is (paper, section 5.2)."""
 
-from tissue.blade.anchors import ANCHORED, holding_node, n_holding_nodes
 from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import PRESSING
+from tissue.blade.edge_anchors import ANCHORED, holding_node, n_holding_nodes
+from tissue.blade.spine_contact import PRESSING
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.elasticity.springs import Springs

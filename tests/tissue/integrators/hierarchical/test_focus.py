@@ -7,7 +7,7 @@ import pytest
 
 from tests.tissue.integrators.networks import block, found_nodes
 from tests.tissue.kernels_of import line_blade
-from tissue.blade.anchors import ANCHORED, new_anchors
+from tissue.blade.edge_anchors import ANCHORED, new_anchors
 from tissue.integrators.hierarchical.focus import find_held, find_rings
 from tissue.integrators.hierarchical.node_rings import (
     UNREACHED,

@@ -26,7 +26,7 @@ from tissue.blade.edge import BladeCoordinates, BladePose
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, axpy, dot, scale, vec3
 from tissue.material import Material

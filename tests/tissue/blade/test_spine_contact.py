@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tissue import BladeShape, Material, block
-from tissue.blade.anchors import new_anchors
 from tissue.blade.blade_state import new_blade_state
-from tissue.blade.blunt_contact import (
+from tissue.blade.edge import Edge, motion_at, pose_at
+from tissue.blade.edge_anchors import new_anchors
+from tissue.blade.spine_contact import (
     BACK,
     HEEL_END,
     PIERCING,
@@ -27,13 +28,12 @@ from tissue.blade.blunt_contact import (
     strip_stiffness,
     touched_point,
 )
-from tissue.blade.blunt_forces import (
+from tissue.blade.spine_forces import (
     add_blunt_stiffness,
     apply_blunt_forces,
     clear_blunt_forces,
     slip_blunt_sides,
 )
-from tissue.blade.edge import Edge, motion_at, pose_at
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.mesh.body import build_body
 from tissue.mesh.star import no_visits

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tissue.mesh.moved_nodes import forget_moved, none_moved, note_moved
+from tissue.mesh.node_motion import forget_moved, none_moved, note_moved
 
 pytestmark = pytest.mark.kernel
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from tissue import BladeShape, Material, block
-from tissue.blade.anchors import new_anchors
 from tissue.blade.blade_state import new_blade_state
 from tissue.blade.edge import BladeCoordinates, Edge, blade_coordinates, motion_at, pose_at
-from tissue.blade.side_contact import (
+from tissue.blade.edge_anchors import new_anchors
+from tissue.blade.faces_contact import (
     POINTS,
     blade_profile,
     contact_point,
@@ -18,8 +18,8 @@ from tissue.blade.side_contact import (
     penetration,
     with_more_faces,
 )
-from tissue.blade.side_forces import add_side_stiffness, apply_side_forces, apply_sliding
-from tissue.blade.side_search import (
+from tissue.blade.faces_forces import add_side_stiffness, apply_side_forces, apply_sliding
+from tissue.blade.faces_search import (
     find_faces,
     forget_cells,
     forget_changed_faces,

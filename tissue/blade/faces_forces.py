@@ -2,7 +2,13 @@
 
 import numpy as np
 
-from tissue.blade.blade_state import BladeState
+from tissue.blade.blade_state import (
+    BladeState,
+    add_reaction,
+    add_to_node,
+    running_totals,
+    store_totals,
+)
 from tissue.blade.edge import (
     BladeCoordinates,
     BladeMotion,
@@ -10,8 +16,7 @@ from tissue.blade.edge import (
     blade_coordinates,
     displacement_of,
 )
-from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
-from tissue.blade.side_contact import (
+from tissue.blade.faces_contact import (
     CORNER,
     END_SLOPE,
     OTHER,

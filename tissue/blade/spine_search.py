@@ -13,7 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import (
+from tissue.blade.edge import BladeMotion, BladePose, displacement_of
+from tissue.blade.faces_contact import SideContacts
+from tissue.blade.return_mapping import locate
+from tissue.blade.spine_contact import (
     AWAY,
     IDLE,
     PIERCING,
@@ -26,9 +29,6 @@ from tissue.blade.blunt_contact import (
     press_of,
     touched_point,
 )
-from tissue.blade.edge import BladeMotion, BladePose, displacement_of
-from tissue.blade.return_mapping import locate
-from tissue.blade.side_contact import SideContacts
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, store, sub, vec3

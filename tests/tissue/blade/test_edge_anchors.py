@@ -5,7 +5,8 @@ import pytest
 
 from tests.tissue.kernels_of import elastic_of, line_blade, springs_of
 from tissue import Material, TetrahedralMesh, block
-from tissue.blade.anchors import (
+from tissue.blade.edge import Edge, motion_at, pose_at
+from tissue.blade.edge_anchors import (
     ANCHORED,
     FREE,
     LEFT,
@@ -19,16 +20,14 @@ from tissue.blade.anchors import (
     measure_speeds,
     new_anchors,
 )
-from tissue.blade.blade_mass import LIMIT_AT_BLADE, limit_frequency_at_blade
-from tissue.blade.edge import Edge, motion_at, pose_at
 from tissue.blade.edge_forces import apply_edge_forces
-from tissue.blade.engagement import (
+from tissue.blade.edge_search import (
     anchor_beside,
     anchor_entering,
     any_free_in_box,
     free_retracted,
 )
-from tissue.blade.forces import frequency_with_blade
+from tissue.blade.forces import LIMIT_AT_BLADE, frequency_with_blade, limit_frequency_at_blade
 from tissue.blade.material_frame import to_material
 from tissue.blade.return_mapping import locate, set_anchor, slip_anchors
 from tissue.blade.toughness import toughness_law_of

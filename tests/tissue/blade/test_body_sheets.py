@@ -9,8 +9,8 @@ import pytest
 
 from tests.tissue.kernels_of import line_blade
 from tissue import TetrahedralMesh, block
-from tissue.blade.anchors import FREE, LEFT, RETRACTED, new_anchors
 from tissue.blade.edge import Edge
+from tissue.blade.edge_anchors import FREE, LEFT, RETRACTED, new_anchors
 from tissue.blade.material_frame import find_walls
 from tissue.blade.path_tracing import forget_path, trace_path
 from tissue.blade.return_mapping import set_anchor

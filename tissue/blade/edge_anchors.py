@@ -9,10 +9,10 @@ the cut, and the work of slipping is the toughness times the area at rest.
 
 import numpy as np
 
+from tissue.blade.body_sheets import Walls, new_walls
 from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
 from tissue.blade.toughness import ToughnessLaw, skin_toughness_at, toughness_at
-from tissue.blade.walls import Walls, new_walls
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays

@@ -1,7 +1,15 @@
 """Forces of the blade's blunt sides on the nodes, sliding against friction, and piercing."""
 
-from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import (
+from tissue.blade.blade_state import (
+    BladeState,
+    add_reaction,
+    add_to_node,
+    running_totals,
+    store_totals,
+)
+from tissue.blade.edge import BladeMotion, BladePose, displacement_of
+from tissue.blade.material_frame import to_material
+from tissue.blade.spine_contact import (
     IDLE,
     PIERCING,
     PRESSING,
@@ -14,10 +22,7 @@ from tissue.blade.blunt_contact import (
     tip_toughness,
     touched_point,
 )
-from tissue.blade.blunt_search import move_point
-from tissue.blade.edge import BladeMotion, BladePose, displacement_of
-from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
-from tissue.blade.material_frame import to_material
+from tissue.blade.spine_search import move_point
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, scale, sub, vec3

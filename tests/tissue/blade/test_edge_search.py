@@ -5,9 +5,9 @@ import pytest
 
 from tests.tissue.kernels_of import line_blade
 from tissue import Tissue, block
-from tissue.blade.anchors import ANCHORED, FREE, new_anchors
 from tissue.blade.edge import Edge, pose_at
-from tissue.blade.engagement import anchor_beside, is_behind_edge, is_in_slit
+from tissue.blade.edge_anchors import ANCHORED, FREE, new_anchors
+from tissue.blade.edge_search import anchor_beside, is_behind_edge, is_in_slit
 from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path

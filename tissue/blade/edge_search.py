@@ -5,7 +5,10 @@ is anchored as far behind the blade as its neighbour. In an existing slit neithe
 left to cut there. A sample that backed off and then went elsewhere is freed.
 """
 
-from tissue.blade.anchors import (
+from tissue.blade.blade_state import BladeState
+from tissue.blade.body_sheets import join_wall, rotation_of_wall
+from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
+from tissue.blade.edge_anchors import (
     ANCHORED,
     FREE,
     RETRACTED,
@@ -15,15 +18,12 @@ from tissue.blade.anchors import (
     pulling_point,
     stored_energy,
 )
-from tissue.blade.blade_state import BladeState
-from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
 from tissue.blade.material_frame import find_walls, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
-from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, nearest_on_edge
-from tissue.geometry.polar_decomposition import apply_transposed
+from tissue.geometry.rotations import apply_transposed
 from tissue.geometry.tetrahedron import (
     barycentric_in,
     interpolate,

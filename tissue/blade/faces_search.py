@@ -3,12 +3,12 @@
 The cost is that of the open faces in the cells of the grid that the box of the blade meets. They
 are listed where the box comes to other cells; after that, what is cut or listed there. A face that
 was known keeps its state; a face that is new and already within the blade begins where it is (see
-`tissue.blade.side_contact`).
+`tissue.blade.faces_contact`).
 """
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
-from tissue.blade.side_contact import (
+from tissue.blade.faces_contact import (
     CLEARANCE,
     POINTS,
     ContactStates,
@@ -20,8 +20,7 @@ from tissue.blade.side_contact import (
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, lanes
-from tissue.core.simd_gather import larger, larger_bits
-from tissue.core.simd_rows import points_of_column
+from tissue.core.simd_rows import larger, larger_bits, points_of_column
 from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
 from tissue.geometry.aabb import Aabb, widened, with_point
 from tissue.mesh.body import Body, is_open
