@@ -14,7 +14,7 @@ from tissue.contact.response.contacts import new_penalty_forces
 from tissue.core.thread_team import new_team
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
-from tissue.cutting.cut_surface import new_sheet
+from tissue.cutting.cut_surface import new_cut_surface
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.collapse import no_collapse
 from tissue.elasticity.energy_density import volume_term
@@ -49,7 +49,7 @@ def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
     return Cut(
         body=grown_body(build_body(mesh, None, None), n_nodes, n_tetrahedra),
         visits=no_visits(n_nodes, n_tetrahedra),
-        sheet=new_sheet(n_nodes, n_tetrahedra),
+        surface=new_cut_surface(n_nodes, n_tetrahedra),
         path=new_path(n_samples),
         change=new_change(),
         scratch=new_cut_scratch(n_tetrahedra),

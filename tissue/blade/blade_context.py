@@ -20,7 +20,7 @@ from tissue.blade.edge_search import (
 from tissue.blade.faces_search import blade_box, find_faces, release_faces
 from tissue.blade.forces import clear_blade_forces
 from tissue.blade.path_tracing import trace_path
-from tissue.blade.spine_search import release_blunt_sides, update_blunt_sides
+from tissue.blade.spine_search import release_spine, update_spine
 from tissue.blade.wrench import BladeReport, WrenchReport, write_means, write_report
 from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import FloatArray, IntArray
@@ -68,8 +68,8 @@ class BladeContext(Arrays):
     slit_reach: float
     """Distance from a cut face up to which a point is in the slit [m]
     (`tissue.blade.edge_search.is_in_slit`)."""
-    sheet_margin: float
-    """How far outside the skin the sheet of the cut begins and ends [m]."""
+    cut_margin: float
+    """Distance outside the skin at which the cut surface begins and ends [m]."""
 
 
 @kernel
@@ -88,7 +88,7 @@ def _list_tetrahedra(context: BladeContext, nodes: IntArray, n: int) -> bool:
 def release_sides(blade: BladeState) -> None:
     """End all contacts of the side faces, the back and the ends; count their energy as released."""
     release_faces(blade)
-    release_blunt_sides(blade)
+    release_spine(blade)
 
 
 @kernel
@@ -110,7 +110,7 @@ def update_faces(context: BladeContext, edge: Edge, when: float, nodes: IntArray
         return GRID_IS_FULL
     if not find_faces(blade, context.body, context.grid, edge, when):
         return NO_ROOM_FOR_FACES
-    update_blunt_sides(blade, context.body, context.grid, motion_at(edge, when))
+    update_spine(blade, context.body, context.grid, motion_at(edge, when))
     return SEARCHED
 
 
@@ -159,7 +159,7 @@ def trace(context: BladeContext, edge: Edge, when: float) -> float:
     anchors, path = context.blade.anchors, context.path
     if not is_engaged(anchors):
         return NOT_ENGAGED
-    trace_path(context.blade, context.body, edge, when, context.sheet_margin, path)
+    trace_path(context.blade, context.body, edge, when, context.cut_margin, path)
     return path_travel(path)
 
 

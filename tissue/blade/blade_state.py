@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.blade.edge_anchors import Anchors
-from tissue.blade.faces_contact import SideContacts, new_side_contacts
-from tissue.blade.spine_contact import BluntContacts, no_blunt_contacts
+from tissue.blade.faces_contact import FaceContacts, new_face_contacts
+from tissue.blade.spine_contact import SpineContacts, no_spine_contacts
 from tissue.blade.toughness import ToughnessLaw, toughness_law_of
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
@@ -180,9 +180,9 @@ class BladeState(Arrays):
 
     anchors: Anchors
     """Samples of the cutting edge."""
-    sides: SideContacts
+    sides: FaceContacts
     """Faces of the tissue near the side faces of the blade."""
-    blunt: BluntContacts
+    spine: SpineContacts
     """Samples of the back and the ends of the blade."""
     toughness: ToughnessLaw
     """Energy that cutting takes."""
@@ -213,8 +213,8 @@ def new_blade_state(
     """
     return BladeState(
         anchors=anchors,
-        sides=new_side_contacts(shape, material, node_size, n_tetrahedra),
-        blunt=no_blunt_contacts(),
+        sides=new_face_contacts(shape, material, node_size, n_tetrahedra),
+        spine=no_spine_contacts(),
         toughness=toughness_law_of(material, shape),
         totals=new_totals(),
         reach=float(REACH * node_size),

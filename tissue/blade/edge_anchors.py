@@ -9,7 +9,7 @@ the cut, and the work of slipping is the toughness times the area at rest.
 
 import numpy as np
 
-from tissue.blade.body_sheets import Walls, new_walls
+from tissue.blade.body_sheets import BodySheets, new_body_sheets
 from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
 from tissue.blade.toughness import ToughnessLaw, skin_toughness_at, toughness_at
@@ -91,8 +91,8 @@ class Anchors(Arrays):
     """Length of edge that the sample stands for [m], shape (n,)."""
     stiffness: FloatArray
     """Stiffness of the anchor's spring [N/m], shape (n,)."""
-    walls: Walls
-    """The wall that each sample holds, of its run of samples (`find_walls`)."""
+    sheets: BodySheets
+    """The sheet that each sample holds, of its run of samples (`find_sheets`)."""
 
 
 def anchor_stiffness(material: Material, toughness: float, node_size: float) -> float:
@@ -141,7 +141,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         cut=np.zeros(n),
         length=length,
         stiffness=stiffness * length,
-        walls=new_walls(n),
+        sheets=new_body_sheets(n),
     )
 
 

@@ -6,7 +6,7 @@ left to cut there. A sample that backed off and then went elsewhere is freed.
 """
 
 from tissue.blade.blade_state import BladeState
-from tissue.blade.body_sheets import join_wall, rotation_of_wall
+from tissue.blade.body_sheets import join_sheet, rotation_of_sheet
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
 from tissue.blade.edge_anchors import (
     ANCHORED,
@@ -18,7 +18,7 @@ from tissue.blade.edge_anchors import (
     pulling_point,
     stored_energy,
 )
-from tissue.blade.material_frame import find_walls, rest_offset, to_material
+from tissue.blade.material_frame import find_sheets, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, store, sub, vec3
@@ -66,11 +66,11 @@ def free_retracted(
         any_retracted = any_retracted or anchors.state[k] == RETRACTED
     if not any_retracted:
         return
-    find_walls(anchors, body, blade.reach)
+    find_sheets(anchors, body, blade.reach)
     for k in range(n):
         if anchors.state[k] != RETRACTED:
             continue
-        rotation = rotation_of_wall(anchors.walls, k)
+        rotation = rotation_of_sheet(anchors.sheets, k)
         a = anchor_position(anchors, body, body.positions, k)
         offset = apply_transposed(rotation, sub(sample_point(pose, k, n), a))
         p = add(vec3(anchors.rest, k), offset)
@@ -106,7 +106,7 @@ def anchor_beside(
     """
     anchors = blade.anchors
     n = len(anchors.state)
-    find_walls(anchors, body, blade.reach)
+    find_sheets(anchors, body, blade.reach)
     for direction in range(2):
         for i in range(n):
             k = i if direction == 0 else n - 1 - i
@@ -115,7 +115,7 @@ def anchor_beside(
                 continue
             if anchors.state[beside] != ANCHORED:
                 continue
-            rotation = rotation_of_wall(anchors.walls, beside)
+            rotation = rotation_of_sheet(anchors.sheets, beside)
             offset = rest_offset(pose, rotation, n, k, beside)
             p = add(vec3(anchors.rest, beside), offset)
             location = locate(body, visits, p, anchors.tetrahedron[beside], blade.queue)
@@ -132,7 +132,7 @@ def anchor_beside(
                 continue
             # Beside skin that is not broken it is skin too, else the edge broke in unopposed there.
             _begin_anchor(anchors, body, k, t, p, anchors.at_skin[beside])
-            join_wall(anchors.walls, k, beside)
+            join_sheet(anchors.sheets, k, beside)
             anchors.rest_share[k] = anchors.rest_share[beside]
             store(anchors.rest_area, k, vec3(anchors.rest_area, beside))
             anchors.offset[k] = anchors.offset[beside]

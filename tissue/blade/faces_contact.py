@@ -33,7 +33,7 @@ from tissue.material import Material
 from tissue.mesh.body import grown
 from tissue.mesh.faces import OUTWARD
 
-SIDE_STIFFNESS = 2.0
+FACE_STIFFNESS = 2.0
 """Stiffness of a side face of the blade, as pressure per depth, over Young's modulus per node size.
 It stands for the tissue that is closer to the face than the mesh resolves. With 4 the Runge-Kutta
 steps of a fine mesh were half as many again."""
@@ -78,7 +78,7 @@ class ContactStates(Arrays):
     """Speed of the point when sliding was applied last [m/s], shape (capacity, 3)."""
 
 
-class SideContacts(Arrays):
+class FaceContacts(Arrays):
     """The faces of the tissue that are near the side faces of the blade, and the law of contact."""
 
     n_faces: IntCell
@@ -126,18 +126,18 @@ class SideContacts(Arrays):
     """`faces.OUTWARD`."""
 
 
-def new_side_contacts(
+def new_face_contacts(
     shape: BladeShape | None, material: Material, node_size: float, n_tetrahedra: int
-) -> SideContacts:
+) -> FaceContacts:
     """Return the contacts of a blade that touches nothing; None is a line without side faces."""
     thin = shape is None
-    return SideContacts(
+    return FaceContacts(
         n_faces=0,
         n_around=-1,
         half_thickness=0.0 if shape is None else float(0.5 * shape.thickness),
         slope=1.0 if shape is None else float(shape.slope),
         height=0.0 if shape is None else float(shape.height),
-        stiffness=float(SIDE_STIFFNESS * material.young_modulus / node_size),
+        stiffness=float(FACE_STIFFNESS * material.young_modulus / node_size),
         friction=float(material.blade_friction),
         viscosity=float(material.blade_viscosity),
         margin=float(SEARCH_MARGIN * node_size),
@@ -172,7 +172,7 @@ def _new_states(capacity: int) -> ContactStates:
     )
 
 
-def with_more_faces(sides: SideContacts) -> SideContacts:
+def with_more_faces(sides: FaceContacts) -> FaceContacts:
     """Return the side contacts with room for twice as many faces."""
     n = 2 * len(sides.face)
     names = ("face", "node", "around", "node_around", "found", "row_before")
@@ -181,7 +181,7 @@ def with_more_faces(sides: SideContacts) -> SideContacts:
     return sides.replaced(**arrays, states=ContactStates(**states), states_before=_new_states(n))
 
 
-def grown_side_contacts(sides: SideContacts, n_tetrahedra: int) -> SideContacts:
+def grown_face_contacts(sides: FaceContacts, n_tetrahedra: int) -> FaceContacts:
     """Return the side contacts with room for that many tetrahedra."""
     if sides.half_thickness == 0.0:
         return sides
@@ -246,7 +246,7 @@ class ContactForces(NamedTuple):
 
 @kernel
 def blade_profile(
-    sides: SideContacts, length: float, bevel_shift: float, at: BladeCoordinates
+    sides: FaceContacts, length: float, bevel_shift: float, at: BladeCoordinates
 ) -> Profile:
     """Return the outline of a blade whose edge is of that length [m], at a point.
 
@@ -268,7 +268,7 @@ def blade_profile(
 
 
 @kernel
-def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) -> Vec3:
+def contact_point(sides: FaceContacts, positions: FloatArray, i: int, q: int) -> Vec3:
     """Return the position of contact point `q` of row `i`, with the nodes at `positions` [m]."""
     node = sides.node
     p = scale(CORNER, vec3(positions, node[i, q]))
@@ -277,7 +277,7 @@ def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) ->
 
 
 @inlined
-def corners_of(sides: SideContacts, positions: FloatArray, i: int) -> FaceCorners:
+def corners_of(sides: FaceContacts, positions: FloatArray, i: int) -> FaceCorners:
     """Return the corners of row `i`, with the nodes at `positions` [m]."""
     node = sides.node
     a, b, c = natural(node[i, 0]), natural(node[i, 1]), natural(node[i, 2])
@@ -297,7 +297,7 @@ def turned(corners: FaceCorners) -> FaceCorners:
 
 
 @inlined
-def is_clear(sides: SideContacts, pose: BladePose, corners: FaceCorners, i: int) -> bool:
+def is_clear(sides: FaceContacts, pose: BladePose, corners: FaceCorners, i: int) -> bool:
     """Return whether face `i` is farther from the blade's plane than the blade is thick anywhere.
 
     `corners`: where its corners are [m].
@@ -314,7 +314,7 @@ def is_clear(sides: SideContacts, pose: BladePose, corners: FaceCorners, i: int)
 
 @kernel
 def penetration(
-    sides: SideContacts, length: float, i: int, q: int, at: BladeCoordinates
+    sides: FaceContacts, length: float, i: int, q: int, at: BladeCoordinates
 ) -> Penetration:
     """Return the depth of a contact point within the blade.
 
@@ -332,7 +332,7 @@ def penetration(
 
 @kernel
 def friction_stretch(
-    sides: SideContacts, i: int, q: int, at: BladeCoordinates, normal_force: float
+    sides: FaceContacts, i: int, q: int, at: BladeCoordinates, normal_force: float
 ) -> FrictionStretch:
     """Return the stretch of the friction spring at a contact point, cut off at the friction limit.
 
@@ -359,7 +359,7 @@ def friction_stretch(
 
 @kernel
 def contact_forces(
-    sides: SideContacts, pose: BladePose, i: int, q: int, at: BladeCoordinates, inside: Penetration
+    sides: FaceContacts, pose: BladePose, i: int, q: int, at: BladeCoordinates, inside: Penetration
 ) -> ContactForces:
     """Return the forces of the blade on the tissue at a contact point that is within it.
 
@@ -383,7 +383,7 @@ def contact_forces(
 
 
 @kernel
-def sides_energy(sides: SideContacts) -> float:
+def faces_energy(sides: FaceContacts) -> float:
     """Return the energy stored in the side contacts when sliding was applied last [J]."""
     energy = 0.0
     for i in range(sides.n_faces):

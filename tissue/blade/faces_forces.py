@@ -21,7 +21,7 @@ from tissue.blade.faces_contact import (
     END_SLOPE,
     OTHER,
     POINTS,
-    SideContacts,
+    FaceContacts,
     contact_forces,
     corners_of,
     friction_stretch,
@@ -37,7 +37,7 @@ from tissue.mesh.body import Body
 
 
 @kernel
-def apply_side_forces(
+def apply_face_forces(
     blade: BladeState,
     motion: BladeMotion,
     positions: FloatArray,
@@ -79,7 +79,7 @@ def apply_side_forces(
 
 
 @kernel
-def _force_at(sides: SideContacts, pose: BladePose, i: int, q: int, at: BladeCoordinates) -> Vec3:
+def _force_at(sides: FaceContacts, pose: BladePose, i: int, q: int, at: BladeCoordinates) -> Vec3:
     """Return the force of the blade on the tissue at a contact point [N]."""
     inside = penetration(sides, pose.length, i, q, at)
     if inside.depth <= 0.0:
@@ -129,7 +129,7 @@ def apply_sliding(
 
 @kernel
 def _slide_point(
-    sides: SideContacts, i: int, q: int, at: BladeCoordinates, normal_force: float, seconds: float
+    sides: FaceContacts, i: int, q: int, at: BladeCoordinates, normal_force: float, seconds: float
 ) -> None:
     """Move the point where friction would be zero, by an implicit step.
 
@@ -151,7 +151,7 @@ def _slide_point(
 
 
 @kernel
-def clear_side_forces(sides: SideContacts, external: FloatArray) -> None:
+def clear_face_forces(sides: FaceContacts, external: FloatArray) -> None:
     """Set the forces on the nodes that the side faces may press on to zero."""
     for i in range(sides.n_faces):
         for corner in range(3):
@@ -160,7 +160,7 @@ def clear_side_forces(sides: SideContacts, external: FloatArray) -> None:
 
 
 @kernel
-def add_side_stiffness(sides: SideContacts, stiffness: FloatArray) -> None:
+def add_face_stiffness(sides: FaceContacts, stiffness: FloatArray) -> None:
     """Add the rows of the side contacts to `stiffness` [N/m], shape (capacity, 3).
 
     Only x of `stiffness` is used. The stiffness of a contact point is the same across the face and
@@ -174,8 +174,8 @@ def add_side_stiffness(sides: SideContacts, stiffness: FloatArray) -> None:
 
 
 @kernel
-def highest_side_frequency(
-    sides: SideContacts, body: Body, frequency_squared: FloatArray, stiffness: FloatArray
+def highest_face_frequency(
+    sides: FaceContacts, body: Body, frequency_squared: FloatArray, stiffness: FloatArray
 ) -> float:
     """Return a bound on w^2 [1/s2] over the nodes near the side faces.
 

@@ -12,7 +12,7 @@ from tissue.blade.faces_contact import (
     CLEARANCE,
     POINTS,
     ContactStates,
-    SideContacts,
+    FaceContacts,
     contact_point,
     friction_stretch,
     penetration,
@@ -34,18 +34,18 @@ third to a half while it went in."""
 
 
 _LISTED, _CHANGED = 1, 2
-"""Values of `SideContacts.is_around`: the open faces of a tetrahedron are listed, or were when it
+"""Values of `FaceContacts.is_around`: the open faces of a tetrahedron are listed, or were when it
 changed."""
 
 
 @kernel
-def blade_box(sides: SideContacts, edge: Edge, when: float) -> Aabb:
+def blade_box(sides: FaceContacts, edge: Edge, when: float) -> Aabb:
     """Return the box in which faces are listed [m]."""
     return _box_at(sides, pose_at(edge, when))
 
 
 @kernel
-def _box_at(sides: SideContacts, pose: BladePose) -> Aabb:
+def _box_at(sides: FaceContacts, pose: BladePose) -> Aabb:
     """Return the box around a blade and its margin [m]."""
     box = Aabb(pose.tip, pose.tip)
     half = sides.half_thickness
@@ -68,7 +68,7 @@ def release_faces(blade: BladeState) -> None:
 
 
 @kernel
-def forget_changed_faces(sides: SideContacts, body: Body, changed: IntArray, n: int) -> None:
+def forget_changed_faces(sides: FaceContacts, body: Body, changed: IntArray, n: int) -> None:
     """Treat the faces of the first `n` of `changed`, tetrahedra that were cut, as new.
 
     Those that are listed are listed again: other faces of them may be open, with other nodes.
@@ -97,7 +97,7 @@ def forget_changed_faces(sides: SideContacts, body: Body, changed: IntArray, n: 
 
 
 @kernel
-def forget_cells(sides: SideContacts) -> None:
+def forget_cells(sides: FaceContacts) -> None:
     """List the faces around the blade again at the next search: the mesh or the grid changed."""
     sides.n_around = -1
 
@@ -142,7 +142,7 @@ def find_faces(
 
 
 @kernel
-def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
+def _are_other_cells(sides: FaceContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
     """Write which cells `box` [m] overlaps; return whether they are others than before.
 
     A blade often stays within the same cells for many steps.
@@ -157,7 +157,7 @@ def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> b
 
 
 @kernel
-def _list_open_faces(sides: SideContacts, body: Body, grid: TetrahedronGrid) -> None:
+def _list_open_faces(sides: FaceContacts, body: Body, grid: TetrahedronGrid) -> None:
     """List the open faces in those cells; `sides.n_around` is -1 where there is no room."""
     cells, listed = sides.cells, sides.is_around
     for t in range(len(listed)):
@@ -179,7 +179,7 @@ def _list_open_faces(sides: SideContacts, body: Body, grid: TetrahedronGrid) -> 
 
 
 @kernel
-def _list_logged(sides: SideContacts, body: Body, grid: TetrahedronGrid) -> None:
+def _list_logged(sides: FaceContacts, body: Body, grid: TetrahedronGrid) -> None:
     """List the open faces of tetrahedra that were listed in those cells since the last search."""
     for i in range(grid.n_logged):
         t = grid.log[i]
@@ -190,7 +190,7 @@ def _list_logged(sides: SideContacts, body: Body, grid: TetrahedronGrid) -> None
 
 
 @kernel
-def _is_in_cells(sides: SideContacts, grid: TetrahedronGrid, t: int) -> bool:
+def _is_in_cells(sides: FaceContacts, grid: TetrahedronGrid, t: int) -> bool:
     """Return whether a tetrahedron is listed in one of those cells."""
     for c in range(3):
         if grid.cells[t, c] > sides.cells[3 + c] or grid.cells[t, 3 + c] < sides.cells[c]:
@@ -199,7 +199,7 @@ def _is_in_cells(sides: SideContacts, grid: TetrahedronGrid, t: int) -> bool:
 
 
 @kernel
-def _list_open_faces_of(sides: SideContacts, body: Body, t: int) -> bool:
+def _list_open_faces_of(sides: FaceContacts, body: Body, t: int) -> bool:
     """List the open faces of a tetrahedron; return whether there was room.
 
     The list rises: its order is that of the sums of the forces of faces. The grid lists tetrahedra
@@ -222,7 +222,7 @@ def _list_open_faces_of(sides: SideContacts, body: Body, t: int) -> bool:
 
 
 @kernel
-def _move_row(sides: SideContacts, i: int, j: int) -> None:
+def _move_row(sides: FaceContacts, i: int, j: int) -> None:
     """Move a listed face from row `i` to row `j`."""
     sides.around[j] = sides.around[i]
     for corner in range(3):
@@ -230,7 +230,7 @@ def _move_row(sides: SideContacts, i: int, j: int) -> None:
 
 
 @inlined
-def _near_plane(sides: SideContacts, x: FloatArray, pose: BladePose, i: int) -> int:
+def _near_plane(sides: FaceContacts, x: FloatArray, pose: BladePose, i: int) -> int:
     """Return a bit for each of eight faces from `i` on: whether it may be near the blade's plane.
 
     A blade is thin: most faces are beside it.
@@ -246,7 +246,7 @@ def _near_plane(sides: SideContacts, x: FloatArray, pose: BladePose, i: int) -> 
 
 
 @inlined
-def _across(sides: SideContacts, x: FloatArray, pose: BladePose, i: int, corner: int) -> Lanes:
+def _across(sides: FaceContacts, x: FloatArray, pose: BladePose, i: int, corner: int) -> Lanes:
     """Return how far a corner of eight faces from `i` on is from the blade's plane [m]."""
     px, py, pz = points_of_column(x, sides.node_around, i, corner)
     tip, normal = pose.tip, pose.normal
@@ -256,7 +256,7 @@ def _across(sides: SideContacts, x: FloatArray, pose: BladePose, i: int, corner:
 
 
 @kernel
-def _is_near(sides: SideContacts, x: FloatArray, pose: BladePose, i: int) -> bool:
+def _is_near(sides: FaceContacts, x: FloatArray, pose: BladePose, i: int) -> bool:
     """Return whether the box of face `i` of `around`, in the axes of the blade, meets the blade."""
     a = sub(vec3(x, sides.node_around[i, 0]), pose.tip)
     b = sub(vec3(x, sides.node_around[i, 1]), pose.tip)
@@ -343,7 +343,7 @@ def _copy_point(source: ContactStates, target: ContactStates, i: int, j: int, q:
 
 
 @kernel
-def _measure_face(sides: SideContacts, body: Body, pose: BladePose, row: int) -> bool:
+def _measure_face(sides: FaceContacts, body: Body, pose: BladePose, row: int) -> bool:
     """Write side and area of the face in `row`; return whether it has a side."""
     a = vec3(body.positions, sides.node[row, 0])
     b = vec3(body.positions, sides.node[row, 1])
@@ -358,7 +358,7 @@ def _measure_face(sides: SideContacts, body: Body, pose: BladePose, row: int) ->
 
 
 @kernel
-def _begin_point(sides: SideContacts, body: Body, pose: BladePose, row: int, q: int) -> None:
+def _begin_point(sides: FaceContacts, body: Body, pose: BladePose, row: int, q: int) -> None:
     """Begin a contact point of a new face where it is."""
     states = sides.states
     at = blade_coordinates(pose, contact_point(sides, body.positions, row, q))
@@ -372,7 +372,7 @@ def _begin_point(sides: SideContacts, body: Body, pose: BladePose, row: int, q: 
 
 
 @kernel
-def _face_energy(sides: SideContacts, body: Body, pose: BladePose, row: int) -> float:
+def _face_energy(sides: FaceContacts, body: Body, pose: BladePose, row: int) -> float:
     """Return the energy between a face and the blade, by pressure and friction [J]."""
     stiffness = sides.stiffness * sides.states.area[row]
     energy = 0.0

@@ -1,6 +1,6 @@
 """Vectors of the deformed body, mapped to the body at rest."""
 
-from tissue.blade.body_sheets import rotation_of_wall, write_rotation
+from tissue.blade.body_sheets import rotation_of_sheet, write_rotation
 from tissue.blade.edge import BladePose, sample_point
 from tissue.blade.edge_anchors import FREE, Anchors
 from tissue.core.jit import kernel
@@ -54,11 +54,11 @@ def way_at_rest(
     sheared, one to each side. An anchor mostly is in one of them, and by that one alone would be
     led away from the cut, ever further: up to 0.6 mm in a block that is symmetric about it, where
     the force on the blade to that side was a third of that of the cut. Where the other lip has
-    parted already, the way goes straight on. Where the body ends beside the cut, as in a thin wall
+    parted already, the way goes straight on. Where the body ends beside the cut, as in a thin sheet
     that folds, the anchor's own tetrahedron decides.
 
     Args:
-        anchors: The samples, with their walls.
+        anchors: The samples, with their sheets.
         body: The tissue.
         k: The anchor.
         way: The way in the body as it is [m], in the plane of the blade.
@@ -66,7 +66,7 @@ def way_at_rest(
         reach: `BladeState.reach` [m].
     """
     t, at = anchors.tetrahedron[k], vec3(anchors.rest, k)
-    sideways = apply_transposed(rotation_of_wall(anchors.walls, k), normal)
+    sideways = apply_transposed(rotation_of_sheet(anchors.sheets, k), normal)
     here = to_material(body, t, way)
     right = walk(body, axpy(BESIDE * reach, sideways, at), t)
     left = walk(body, axpy(-BESIDE * reach, sideways, at), t)
@@ -84,38 +84,38 @@ def way_at_rest(
 
 
 @kernel
-def find_walls(anchors: Anchors, body: Body, apart: float) -> None:
-    """Find the walls that the samples hold, and how each is turned.
+def find_sheets(anchors: Anchors, body: Body, apart: float) -> None:
+    """Find the sheets that the samples hold, and how each is turned.
 
-    Samples that follow each other along the edge hold the same wall unless their material points
+    Samples that follow each other along the edge hold the same sheet unless their material points
     are far apart, or there is a long gap between them. A single sample may let go for an instant;
-    that does not part a wall.
+    that does not part a sheet.
 
     Args:
-        anchors: The samples; `walls` is written.
+        anchors: The samples; `sheets` is written.
         body: The tissue.
-        apart: Length of a gap that parts two walls, and by how much more than their samples two
-            points of one wall may be apart at rest [m].
+        apart: Length of a gap that parts two sheets, and by how much more than their samples two
+            points of one sheet may be apart at rest [m].
     """
-    walls = anchors.walls
+    sheets = anchors.sheets
     n = len(anchors.state)
     spacing = 2.0 * anchors.length[0]  # the first sample stands for half
     before = -1
     for k in range(n):
-        walls.first[k] = -1
+        sheets.first[k] = -1
         if anchors.state[k] == FREE:
             continue
-        walls.first[k] = k
+        sheets.first[k] = k
         if before >= 0:
             distance = norm(sub(vec3(anchors.rest, k), vec3(anchors.rest, before)))
             between = spacing * (k - before)
             if between - spacing <= apart and distance <= apart + between:
-                walls.first[k] = walls.first[before]
+                sheets.first[k] = sheets.first[before]
             else:
-                write_rotation(walls, body, anchors.tetrahedron, walls.first[before], k)
+                write_rotation(sheets, body, anchors.tetrahedron, sheets.first[before], k)
         before = k
     if before >= 0:
-        write_rotation(walls, body, anchors.tetrahedron, walls.first[before], n)
+        write_rotation(sheets, body, anchors.tetrahedron, sheets.first[before], n)
 
 
 @kernel
@@ -124,7 +124,7 @@ def rest_offset(pose: BladePose, rotation: Matrix3, n: int, k: int, beside: int)
 
     Args:
         pose: Pose of the blade now.
-        rotation: Rotation of the tissue there (see `find_walls`).
+        rotation: Rotation of the tissue there (see `find_sheets`).
         n: Number of samples.
         k: Sample at which the vector ends.
         beside: Sample at which it begins.

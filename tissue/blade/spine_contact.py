@@ -39,7 +39,7 @@ through the skin and held by tissue that it has yet to part."""
 BACK, HEEL_END, TIP_END = 0, 1, 2
 """The blunt sides."""
 
-BLUNT_SAMPLES_PER_NODE_SIZE = 4.0
+SPINE_SAMPLES_PER_NODE_SIZE = 4.0
 """Samples of a blunt side per mean node size."""
 
 RESOLVED = 0.3
@@ -73,7 +73,7 @@ class StripLaw(Arrays):
     """Stiffness per length at most [Pa]."""
 
 
-class BluntContacts(Arrays):
+class SpineContacts(Arrays):
     """The samples of the back and the two ends of the blade, and where they touch the skin."""
 
     n_pressing: IntCell
@@ -110,7 +110,7 @@ class BluntContacts(Arrays):
     sides. It decides the toughness, as that of the edge does."""
 
 
-class BluntSide(NamedTuple):
+class SpineSide(NamedTuple):
     """The axes of a sample."""
 
     at: Vec3
@@ -136,15 +136,15 @@ class Press(NamedTuple):
     """Length of that stretch beyond the limit [m]."""
 
 
-def no_blunt_contacts() -> BluntContacts:
+def no_spine_contacts() -> SpineContacts:
     """Return that the blade has no blunt sides: it is a line."""
     law = StripLaw(unit=1.0, logarithm=1.0, node_size=1.0, most=1.0)
     return _new_contacts(0.0, law, np.zeros((0, 5)))
 
 
-def new_blunt_contacts(
+def new_spine_contacts(
     shape: BladeShape, edge_length: float, material: Material, node_size: float
-) -> BluntContacts:
+) -> SpineContacts:
     """Return the samples of a blade that touches nothing.
 
     Args:
@@ -153,7 +153,7 @@ def new_blunt_contacts(
         material: The tissue.
         node_size: Mean node size of the body [m].
     """
-    spacing = node_size / BLUNT_SAMPLES_PER_NODE_SIZE
+    spacing = node_size / SPINE_SAMPLES_PER_NODE_SIZE
     law = strip_law_of(shape, material, node_size)
     per_length = strip_stiffness(law, 0.0)
     rows = []
@@ -195,23 +195,23 @@ def strip_stiffness(law: StripLaw, mean_square: float) -> float:
 
 
 @kernel
-def fit_stiffness(blunt: BluntContacts, body: Body, k: int, normal: Vec3) -> None:
+def fit_stiffness(spine: SpineContacts, body: Body, k: int, normal: Vec3) -> None:
     """Write the stiffness of sample `k` for the point of the skin that it touches now.
 
     `normal`: unit normal of the blade's plane.
     """
-    point = touched_point(blunt, body, body.positions, k)
+    point = touched_point(spine, body, body.positions, k)
     mean_square = 0.0
     for q in range(4):
-        node = vec3(body.positions, body.tetrahedra[blunt.tetrahedron[k], q])
-        mean_square += blunt.weights[k, q] * dot(sub(node, point), normal) ** 2
-    blunt.stiffness[k] = strip_stiffness(blunt.law, mean_square) * blunt.length[k]
+        node = vec3(body.positions, body.tetrahedra[spine.tetrahedron[k], q])
+        mean_square += spine.weights[k, q] * dot(sub(node, point), normal) ** 2
+    spine.stiffness[k] = strip_stiffness(spine.law, mean_square) * spine.length[k]
 
 
-def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> BluntContacts:
+def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> SpineContacts:
     n = len(rows)
     side, along, behind, length, stiffness = rows.T.copy()
-    return BluntContacts(
+    return SpineContacts(
         n_pressing=0,
         friction=friction,
         law=law,
@@ -231,40 +231,40 @@ def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> BluntCont
 
 
 @kernel
-def measure_tip_speeds(blunt: BluntContacts, edge: Edge, dt: float) -> None:
+def measure_tip_speeds(spine: SpineContacts, edge: Edge, dt: float) -> None:
     """Write the outward speed of each sample of the tip's end in a time step of `dt` [s]."""
     before, after = pose_at(edge, 0.0), pose_at(edge, 1.0)
     along = pose_at(edge, 0.5).along
-    for k in range(len(blunt.state)):
-        if blunt.side[k] == TIP_END:
-            moved = sub(blunt_side(blunt, after, k).at, blunt_side(blunt, before, k).at)
-            blunt.speed[k] = max(-dot(moved, along), 0.0) / dt if dt > 0.0 else 0.0
+    for k in range(len(spine.state)):
+        if spine.side[k] == TIP_END:
+            moved = sub(spine_side(spine, after, k).at, spine_side(spine, before, k).at)
+            spine.speed[k] = max(-dot(moved, along), 0.0) / dt if dt > 0.0 else 0.0
 
 
 @kernel
-def blunt_side(blunt: BluntContacts, pose: BladePose, k: int) -> BluntSide:
+def spine_side(spine: SpineContacts, pose: BladePose, k: int) -> SpineSide:
     """Return where sample `k` is, and its axes."""
-    at = axpy(-blunt.behind[k], pose.forward, axpy(blunt.along[k], pose.along, pose.tip))
-    if blunt.side[k] == BACK:
-        return BluntSide(at, scale(-1.0, pose.forward), pose.along)
-    if blunt.side[k] == HEEL_END:
-        return BluntSide(at, pose.along, pose.forward)
-    return BluntSide(at, scale(-1.0, pose.along), pose.forward)
+    at = axpy(-spine.behind[k], pose.forward, axpy(spine.along[k], pose.along, pose.tip))
+    if spine.side[k] == BACK:
+        return SpineSide(at, scale(-1.0, pose.forward), pose.along)
+    if spine.side[k] == HEEL_END:
+        return SpineSide(at, pose.along, pose.forward)
+    return SpineSide(at, scale(-1.0, pose.along), pose.forward)
 
 
 @kernel
-def touched_point(blunt: BluntContacts, body: Body, positions: FloatArray, k: int) -> Vec3:
+def touched_point(spine: SpineContacts, body: Body, positions: FloatArray, k: int) -> Vec3:
     """Return the point that sample `k` touches, with the nodes at `positions` [m]."""
-    w = blunt.weights
+    w = spine.weights
     weights = Weights(w[k, 0], w[k, 1], w[k, 2], w[k, 3])
-    return interpolate(weights, positions, body.tetrahedra, blunt.tetrahedron[k])
+    return interpolate(weights, positions, body.tetrahedra, spine.tetrahedron[k])
 
 
 @kernel
 def press_of(
-    blunt: BluntContacts,
+    spine: SpineContacts,
     k: int,
-    side: BluntSide,
+    side: SpineSide,
     normal: Vec3,
     point: Vec3,
     law: ToughnessLaw,
@@ -272,7 +272,7 @@ def press_of(
     """Return how sample `k` presses.
 
     Args:
-        blunt: The samples.
+        spine: The samples.
         k: Which of them.
         side: Its axes.
         normal: Normal of the blade's plane.
@@ -282,52 +282,52 @@ def press_of(
     stretch = sub(side.at, point)
     depth = dot(stretch, side.outward)
     surplus = 0.0
-    if blunt.side[k] == TIP_END:
-        surplus = max(depth - piercing_depth(blunt, k, law), 0.0)
-    if blunt.state[k] == PIERCING or depth <= 0.0:
+    if spine.side[k] == TIP_END:
+        surplus = max(depth - piercing_depth(spine, k, law), 0.0)
+    if spine.state[k] == PIERCING or depth <= 0.0:
         return Press(depth - surplus, surplus, 0.0, 0.0, 0.0)
-    beside = blunt.held[k, 0] + dot(stretch, side.beside)
-    across = blunt.held[k, 1] + dot(stretch, normal)
+    beside = spine.held[k, 0] + dot(stretch, side.beside)
+    across = spine.held[k, 1] + dot(stretch, normal)
     size = np.sqrt(beside * beside + across * across)
-    most = blunt.friction * (depth - surplus)
+    most = spine.friction * (depth - surplus)
     if size <= most:
         return Press(depth - surplus, surplus, beside, across, 0.0)
     return Press(depth - surplus, surplus, beside * most / size, across * most / size, size - most)
 
 
 @kernel
-def piercing_depth(blunt: BluntContacts, k: int, law: ToughnessLaw) -> float:
+def piercing_depth(spine: SpineContacts, k: int, law: ToughnessLaw) -> float:
     """Return the depth at which sample `k` of the tip's end pierces [m]."""
-    depth: float = tip_toughness(blunt, k, law) * blunt.length[k] / blunt.stiffness[k]
+    depth: float = tip_toughness(spine, k, law) * spine.length[k] / spine.stiffness[k]
     return depth
 
 
 @kernel
-def tip_toughness(blunt: BluntContacts, k: int, law: ToughnessLaw) -> float:
+def tip_toughness(spine: SpineContacts, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area at which sample `k` of the tip's end pierces [J/m2]."""
-    if blunt.state[k] == PIERCING:
-        return toughness_at(law, blunt.speed[k])
-    return skin_toughness_at(law, blunt.speed[k])
+    if spine.state[k] == PIERCING:
+        return toughness_at(law, spine.speed[k])
+    return skin_toughness_at(law, spine.speed[k])
 
 
 @kernel
-def press_energy(blunt: BluntContacts, k: int, press: Press) -> float:
+def press_energy(spine: SpineContacts, k: int, press: Press) -> float:
     """Return the energy stored in sample `k` [J], with what a surplus is about to spend."""
     if press.depth <= 0.0:
         return 0.0
     friction = np.sqrt(press.beside * press.beside + press.across * press.across)
     squares = press.depth * press.depth + friction * friction
     surplus = press.depth * press.surplus + friction * press.slide
-    energy: float = blunt.stiffness[k] * (0.5 * squares + surplus)
+    energy: float = spine.stiffness[k] * (0.5 * squares + surplus)
     return energy
 
 
 @kernel
-def press_force(blunt: BluntContacts, k: int, side: BluntSide, normal: Vec3, press: Press) -> Vec3:
+def press_force(spine: SpineContacts, k: int, side: SpineSide, normal: Vec3, press: Press) -> Vec3:
     """Return the force of a sample on the tissue [N].
 
     Args:
-        blunt: The samples.
+        spine: The samples.
         k: Which of them.
         side: Its axes.
         normal: Normal of the blade's plane.
@@ -337,18 +337,18 @@ def press_force(blunt: BluntContacts, k: int, side: BluntSide, normal: Vec3, pre
         return Vec3(0.0, 0.0, 0.0)
     force = scale(press.depth, side.outward)
     force = axpy(press.across, normal, axpy(press.beside, side.beside, force))
-    return scale(blunt.stiffness[k], force)
+    return scale(spine.stiffness[k], force)
 
 
 @kernel
-def blunt_energy(blunt: BluntContacts, body: Body, pose: BladePose, law: ToughnessLaw) -> float:
+def spine_energy(spine: SpineContacts, body: Body, pose: BladePose, law: ToughnessLaw) -> float:
     """Return the energy stored in the blunt sides with the body where it is [J]."""
     energy = 0.0
-    if blunt.n_pressing > 0:
-        for k in range(len(blunt.state)):
-            if blunt.state[k] >= PRESSING:
-                side = blunt_side(blunt, pose, k)
-                point = touched_point(blunt, body, body.positions, k)
-                press = press_of(blunt, k, side, pose.normal, point, law)
-                energy += press_energy(blunt, k, press)
+    if spine.n_pressing > 0:
+        for k in range(len(spine.state)):
+            if spine.state[k] >= PRESSING:
+                side = spine_side(spine, pose, k)
+                point = touched_point(spine, body, body.positions, k)
+                press = press_of(spine, k, side, pose.normal, point, law)
+                energy += press_energy(spine, k, press)
     return energy

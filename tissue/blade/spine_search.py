@@ -14,19 +14,19 @@ import numpy as np
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladeMotion, BladePose, displacement_of
-from tissue.blade.faces_contact import SideContacts
+from tissue.blade.faces_contact import FaceContacts
 from tissue.blade.return_mapping import locate
 from tissue.blade.spine_contact import (
     AWAY,
     IDLE,
     PIERCING,
     PRESSING,
-    BluntContacts,
-    BluntSide,
-    blunt_side,
+    SpineContacts,
+    SpineSide,
     fit_stiffness,
     press_energy,
     press_of,
+    spine_side,
     touched_point,
 )
 from tissue.core.array_types import IntArray
@@ -69,9 +69,7 @@ class Skin(NamedTuple):
 
 
 @kernel
-def update_blunt_sides(
-    blade: BladeState, body: Body, grid: TetrahedronGrid, motion: BladeMotion
-) -> None:
+def update_spine(blade: BladeState, body: Body, grid: TetrahedronGrid, motion: BladeMotion) -> None:
     """Find what the blunt sides press on.
 
     Args:
@@ -80,36 +78,36 @@ def update_blunt_sides(
         grid: Grid that lists the tetrahedra.
         motion: Pose and motion of the blade.
     """
-    blunt, pose = blade.blunt, motion.pose
+    spine, pose = blade.spine, motion.pose
     n_faces = _NOT_LISTED
-    for k in range(len(blunt.state)):
-        if blunt.state[k] == PIERCING:
+    for k in range(len(spine.state)):
+        if spine.state[k] == PIERCING:
             continue
-        side = blunt_side(blunt, pose, k)
-        if blunt.state[k] != PRESSING:
-            was_away = blunt.state[k] == AWAY
-            blunt.state[k] = IDLE
+        side = spine_side(spine, pose, k)
+        if spine.state[k] != PRESSING:
+            was_away = spine.state[k] == AWAY
+            spine.state[k] = IDLE
             if not _leads(motion, side):
                 continue
             if tetrahedron_at(body, grid, body.positions, side.at) < 0:
-                blunt.state[k] = AWAY
+                spine.state[k] = AWAY
                 continue
             if not was_away:
                 continue
         if n_faces == _NOT_LISTED:
             n_faces = _list_faces_in_plane(blade.sides, body, pose)
         skin = _skin_behind(blade.sides, body, side, pose.normal, n_faces)
-        if blunt.state[k] == PRESSING:
+        if spine.state[k] == PRESSING:
             _slide(blade, body, pose, side, k, skin)
         elif skin.face >= 0 and skin.depth <= DEEPEST_ENTRY * blade.reach:
-            blunt.held[k, 0] = blunt.held[k, 1] = 0.0
-            blunt.state[k] = PRESSING
-            blunt.n_pressing += 1
+            spine.held[k, 0] = spine.held[k, 1] = 0.0
+            spine.state[k] = PRESSING
+            spine.n_pressing += 1
             _take_point(blade, body, pose, side, k, skin)
 
 
 @kernel
-def _leads(motion: BladeMotion, side: BluntSide) -> bool:
+def _leads(motion: BladeMotion, side: SpineSide) -> bool:
     """Return whether a side goes ahead of the edge, or the blade stands still.
 
     Where the edge goes ahead, it parts what would come to the other sides.
@@ -120,7 +118,7 @@ def _leads(motion: BladeMotion, side: BluntSide) -> bool:
 
 @kernel
 def _slide(
-    blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int, skin: Skin
+    blade: BladeState, body: Body, pose: BladePose, side: SpineSide, k: int, skin: Skin
 ) -> None:
     """Let sample `k` press on the skin where it is now; release it where there is none.
 
@@ -132,27 +130,27 @@ def _slide(
         k: The sample.
         skin: The skin straight behind it.
     """
-    blunt, farthest = blade.blunt, DEEPEST_ENTRY * blade.reach
-    point = touched_point(blunt, body, body.positions, k)
-    press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
+    spine, farthest = blade.spine, DEEPEST_ENTRY * blade.reach
+    point = touched_point(spine, body, body.positions, k)
+    press = press_of(spine, k, side, pose.normal, point, blade.toughness)
     if skin.face >= 0 and skin.depth <= press.depth + farthest:
-        blade.totals.released += press_energy(blunt, k, press)
-        blunt.held[k, 0], blunt.held[k, 1] = press.beside, press.across
+        blade.totals.released += press_energy(spine, k, press)
+        spine.held[k, 0], spine.held[k, 1] = press.beside, press.across
         _take_point(blade, body, pose, side, k, skin)
         return
     # There is no skin straight behind it, or other skin that lies beyond.
     stretch = sub(side.at, point)
     sideways = axpy(-dot(stretch, side.outward), side.outward, stretch)
     if norm(sideways) > farthest:
-        blade.totals.released += press_energy(blunt, k, press)
-        blunt.energy[k] = 0.0
-        blunt.state[k] = IDLE
-        blunt.n_pressing -= 1
+        blade.totals.released += press_energy(spine, k, press)
+        spine.energy[k] = 0.0
+        spine.state[k] = IDLE
+        spine.n_pressing -= 1
 
 
 @kernel
 def _take_point(
-    blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int, skin: Skin
+    blade: BladeState, body: Body, pose: BladePose, side: SpineSide, k: int, skin: Skin
 ) -> None:
     """Let sample `k` touch a point of the skin from now on; count the energy that it begins with.
 
@@ -164,26 +162,26 @@ def _take_point(
         k: The sample.
         skin: The point.
     """
-    blunt = blade.blunt
-    _set_point(blunt, body, k, skin.face // 4, skin.weights)
-    fit_stiffness(blunt, body, k, pose.normal)
-    point = touched_point(blunt, body, body.positions, k)
-    press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
-    blunt.energy[k] = press_energy(blunt, k, press)
-    blade.totals.released -= blunt.energy[k]
+    spine = blade.spine
+    _set_point(spine, body, k, skin.face // 4, skin.weights)
+    fit_stiffness(spine, body, k, pose.normal)
+    point = touched_point(spine, body, body.positions, k)
+    press = press_of(spine, k, side, pose.normal, point, blade.toughness)
+    spine.energy[k] = press_energy(spine, k, press)
+    blade.totals.released -= spine.energy[k]
 
 
 @kernel
-def _set_point(blunt: BluntContacts, body: Body, k: int, t: int, w: Weights) -> None:
+def _set_point(spine: SpineContacts, body: Body, k: int, t: int, w: Weights) -> None:
     """Write the point that sample `k` touches, by its weights in tetrahedron `t`."""
-    blunt.tetrahedron[k] = t
-    blunt.weights[k, 0], blunt.weights[k, 1] = w.a, w.b
-    blunt.weights[k, 2], blunt.weights[k, 3] = w.c, w.d
-    store(blunt.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+    spine.tetrahedron[k] = t
+    spine.weights[k, 0], spine.weights[k, 1] = w.a, w.b
+    spine.weights[k, 2], spine.weights[k, 3] = w.c, w.d
+    store(spine.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
 
 
 @kernel
-def _list_faces_in_plane(sides: SideContacts, body: Body, pose: BladePose) -> int:
+def _list_faces_in_plane(sides: FaceContacts, body: Body, pose: BladePose) -> int:
     """Write the open faces around that the blade's plane meets to `sides.found`; return how many.
 
     All samples are in that plane, and look for skin within it.
@@ -203,7 +201,7 @@ def _list_faces_in_plane(sides: SideContacts, body: Body, pose: BladePose) -> in
 
 
 @kernel
-def _skin_behind(sides: SideContacts, body: Body, side: BluntSide, normal: Vec3, n: int) -> Skin:
+def _skin_behind(sides: FaceContacts, body: Body, side: SpineSide, normal: Vec3, n: int) -> Skin:
     """Return the nearest open face that a line from a sample straight into the blade meets.
 
     Args:
@@ -222,7 +220,7 @@ def _skin_behind(sides: SideContacts, body: Body, side: BluntSide, normal: Vec3,
 
 
 @kernel
-def _face_behind(body: Body, face: int, outward: IntArray, side: BluntSide, normal: Vec3) -> Skin:
+def _face_behind(body: Body, face: int, outward: IntArray, side: SpineSide, normal: Vec3) -> Skin:
     """Return where a line from a sample straight into the blade meets a face, if it does."""
     none = Skin(-1, np.inf, Weights(0.0, 0.0, 0.0, 0.0))
     t, f = face // 4, face % 4
@@ -263,14 +261,14 @@ def _in_tetrahedron(i: int, wi: float, j: int, wj: float, k: int, wk: float) -> 
 
 
 @kernel
-def release_blunt_sides(blade: BladeState) -> None:
+def release_spine(blade: BladeState) -> None:
     """End all contact of the blunt sides; count their energy as released."""
-    blunt = blade.blunt
-    for k in range(len(blunt.state)):
-        blade.totals.released += blunt.energy[k]
-        blunt.energy[k] = 0.0
-        blunt.state[k] = AWAY
-    blunt.n_pressing = 0
+    spine = blade.spine
+    for k in range(len(spine.state)):
+        blade.totals.released += spine.energy[k]
+        spine.energy[k] = 0.0
+        spine.state[k] = AWAY
+    spine.n_pressing = 0
 
 
 @kernel
@@ -284,19 +282,19 @@ def move_point(blade: BladeState, body: Body, visits: Visits, k: int, p: Vec3) -
         k: The sample.
         p: The point [m]; for one outside, a point of the tetrahedron nearby is taken.
     """
-    blunt = blade.blunt
-    location = locate(body, visits, p, blunt.tetrahedron[k], blade.queue)
+    spine = blade.spine
+    location = locate(body, visits, p, spine.tetrahedron[k], blade.queue)
     t = location.tetrahedron
-    _set_point(blunt, body, k, t, clipped(barycentric_in(p, body.rest, body.tetrahedra, t)))
+    _set_point(spine, body, k, t, clipped(barycentric_in(p, body.rest, body.tetrahedra, t)))
     return location.inside
 
 
 @kernel
-def relocate_blunt_sides(blade: BladeState, body: Body, visits: Visits) -> None:
+def relocate_spine(blade: BladeState, body: Body, visits: Visits) -> None:
     """Find the tetrahedra of the touched points again after the mesh changed."""
-    blunt = blade.blunt
-    if blunt.n_pressing == 0:
+    spine = blade.spine
+    if spine.n_pressing == 0:
         return
-    for k in range(len(blunt.state)):
-        if blunt.state[k] >= PRESSING:
-            move_point(blade, body, visits, k, vec3(blunt.rest, k))
+    for k in range(len(spine.state)):
+        if spine.state[k] >= PRESSING:
+            move_point(blade, body, visits, k, vec3(spine.rest, k))

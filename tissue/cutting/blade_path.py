@@ -48,7 +48,7 @@ class Path(Arrays):
     """Whether each sample was part of the chain in the step before, so that its `t1` is where it
     was then; shape (n,)."""
     linked: BoolArray
-    """Whether each sample and the next one span a piece of the sheet, shape (n,)."""
+    """Whether each sample and the next one span a piece of the cut surface, shape (n,)."""
     has_left: IntCell
     """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
     has_end_in: IntCell
@@ -83,7 +83,7 @@ def new_path(n: int) -> Path:
 
 
 class Plane(NamedTuple):
-    """The plane of the sheet near a point."""
+    """The plane of the cut surface near a point."""
 
     point: Vec3
     """A point in the plane, in the body at rest [m]."""
@@ -93,7 +93,8 @@ class Plane(NamedTuple):
 
 @kernel
 def plane_at(path: Path, k: int, p: Vec3) -> Plane:
-    """Return the plane of the sheet at the point of segment `k` of the edge nearest to `p` [m]."""
+    """Return the plane of the cut surface at the point of segment `k` of the edge nearest to `p`
+    [m]."""
     tip = vec3(path.t1, k)
     along = sub(vec3(path.t1, k + 1), tip)
     normal = normalised(cross(vec3(path.forward, k), along))
@@ -141,7 +142,7 @@ def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
 
     Args:
         path: Path of the edge.
-        p: The point, on the sheet or near it [m].
+        p: The point, on the cut surface or near it [m].
         margin: Distance by which it is so at least [m].
     """
     k = nearest_on_edge(path, p).segment
@@ -189,7 +190,7 @@ def note_way(path: Path, over: float) -> None:
 
 @kernel
 def plane_near(path: Path, p: Vec3) -> Plane:
-    """Return the plane of the sheet at the point of the edge that is nearest to `p` [m].
+    """Return the plane of the cut surface at the point of the edge that is nearest to `p` [m].
 
     Its normal is zero where the edge spans nothing.
     """

@@ -17,7 +17,7 @@ from tissue.core.jit import kernel
 from tissue.core.simd_rows import natural
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.cutting.blade_path import Path, put_on_lattice
-from tissue.cutting.cut_surface import on_sheet
+from tissue.cutting.cut_surface import on_cut_surface
 from tissue.cutting.workspace import Cut
 from tissue.geometry.aabb import Aabb, overlap, segment_box, tetrahedron_box
 from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
@@ -81,13 +81,13 @@ def _visit(cut: Cut, t: int, epoch: int, is_seed: bool) -> None:
 def _visit_other_lip(cut: Cut, t: int, f: int, epoch: int) -> None:
     """Visit the tetrahedra that touched cut face `f` of `t` from the other side.
 
-    They are the stars of the twins of its nodes. Twins on the current sheet are skipped: ahead of
-    the blade the lips of the current incision are still connected.
+    They are the stars of the twins of its nodes. Twins on the current cut surface are skipped:
+    ahead of the blade the lips of the current incision are still connected.
     """
     body, visits = cut.body, cut.visits
     for k in range(4):
         node = body.tetrahedra[t, k]
-        if k == f or visits.nodes[node] == epoch or on_sheet(cut.sheet, node):
+        if k == f or visits.nodes[node] == epoch or on_cut_surface(cut.surface, node):
             continue
         visits.nodes[node] = epoch
         twin = body.twin[node]

@@ -282,8 +282,9 @@ def checked_scheme(name: str) -> str:
     return name
 
 
-LARGEST_CRUMB = 0.125
-"""Volume of a crumb at most, as a share of the body's: half of a body of six tetrahedra is none."""
+LARGEST_FRAGMENT = 0.125
+"""Volume of a fragment at most, as a share of the body's: half of a body of six tetrahedra is
+none."""
 
 
 def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size: float) -> Scheme:
@@ -305,6 +306,6 @@ def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size
         snap=float(cut.snap),
         floor=float(cut.floor * node_size),
         guard=float(cut.guard * node_size),
-        crumb=float(min(cut.crumb / body.n_tetrahedra, LARGEST_CRUMB) * volume),
+        crumb=float(min(cut.crumb / body.n_tetrahedra, LARGEST_FRAGMENT) * volume),
     )
     return StellarScheme(lengths, len(body.rest), len(body.tetrahedra))

@@ -1,8 +1,8 @@
 """Our scheme of cutting: stellar subdivision, crack front, separation.
 
-Nodes are inserted where the sheet crosses edges of the mesh, by splitting whole stars; the faces
-that then tile the sheet are cut; nodes whose stars fell apart are doubled. There is no table of
-cases, so that no case is missing: cuts may cross, turn back and join.
+Nodes are inserted where the cut surface crosses edges of the mesh, by splitting whole stars; the
+faces that then tile the cut surface are cut; nodes whose stars fell apart are doubled. There is no
+table of cases, so that no case is missing: cuts may cross, turn back and join.
 """
 
 from typing import Final
@@ -14,10 +14,10 @@ from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
-from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
-from tissue.cutting.finishing import finish_sheet
+from tissue.cutting.cut_surface import begin_cut_surface, grown_cut_surface, new_cut_surface
+from tissue.cutting.finishing import finish_cut_surface
 from tissue.cutting.minimum_cut import new_flow_graph
-from tissue.cutting.separation import close_sheet, open_sheet
+from tissue.cutting.separation import close_cut_surface, open_cut_surface
 from tissue.cutting.snapping import insert_crossings
 from tissue.cutting.workspace import (
     Cut,
@@ -51,9 +51,9 @@ def cut_in_a_pass(cut: Cut, how_far: int) -> None:
         extend_fronts(cut)
     resolve_bridges(cut)
     if how_far == TO_THE_END:
-        close_sheet(cut)
+        close_cut_surface(cut)
     else:
-        open_sheet(cut)
+        open_cut_surface(cut)
     remember_active(cut)
 
 
@@ -61,7 +61,7 @@ _DETECT, _CUT = SameTypes(detect_collisions), SameTypes(cut_in_a_pass)
 
 
 class StellarScheme:
-    """Our scheme, with sheet, changes and scratch of the current incision.
+    """Our scheme, with cut surface, changes and scratch of the current incision.
 
     The methods are those of `tissue.cutting.incision.Scheme`.
 
@@ -75,7 +75,7 @@ class StellarScheme:
         self.change = new_change()
         self.doubled_nodes = 1
         self._limits = limits
-        self._sheet = new_sheet(n_nodes, n_tetrahedra)
+        self._surface = new_cut_surface(n_nodes, n_tetrahedra)
         self._scratch = new_cut_scratch(n_tetrahedra)
         self._graph = new_flow_graph(n_tetrahedra)
         self._area_before = 0.0
@@ -108,11 +108,11 @@ class StellarScheme:
         """Part small bridges that the blade passed over, in one pass."""
         cut = self._arrays(body, visits, path)
         clear_changes(cut.change)
-        finish_sheet(cut, self._graph, self.change.area - self._area_before)
+        finish_cut_surface(cut, self._graph, self.change.area - self._area_before)
 
     def forget(self) -> None:
         """Forget the incision: what is detected next belongs to another."""
-        begin_sheet(self._sheet)
+        begin_cut_surface(self._surface)
         self._area_before = self.change.area
         self._scratch.n_previous = 0
 
@@ -127,7 +127,7 @@ class StellarScheme:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
+        self._surface = grown_cut_surface(self._surface, n_nodes, n_tetrahedra)
         self._scratch = self._scratch.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._graph = new_flow_graph(n_tetrahedra)
         self._cut = None
@@ -148,7 +148,7 @@ class StellarScheme:
         return Cut(
             body=body,
             visits=visits,
-            sheet=self._sheet,
+            surface=self._surface,
             path=path,
             change=self.change,
             scratch=self._scratch,

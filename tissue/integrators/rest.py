@@ -48,7 +48,7 @@ def may_rest(context: StepContext, drag: float) -> bool:
         drag: Rate at which free motion dies away [1/s].
     """
     blade = context.blade
-    is_touched = is_engaged(blade.anchors) or blade.sides.n_faces > 0 or blade.blunt.n_pressing > 0
+    is_touched = is_engaged(blade.anchors) or blade.sides.n_faces > 0 or blade.spine.n_pressing > 0
     is_drifting = len(context.loose.node) > 0 and context.contacts.n_contacts == 0
     if is_touched or is_drifting or context.supports.is_moving == 1 or context.geoms.n_contacts > 0:
         return False

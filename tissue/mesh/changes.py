@@ -21,8 +21,8 @@ NODES: Final = 2
 """What lacks room: the arrays of the body, for nodes that are doubled."""
 
 PASS_NODES = 256
-"""Nodes that one pass of a cut step puts on the sheet at most; a step that needs more takes several
-passes. Doubling a node changes some 50 tetrahedra, which must fit into `CHANGES`."""
+"""Nodes that one pass of a cut step puts on the cut surface at most; a step that needs more takes
+several passes. Doubling a node changes some 50 tetrahedra, which must fit into `CHANGES`."""
 
 SPARE_NODES = 4 * PASS_NODES
 """Room that a pass leaves for doubled nodes: no node becomes more than a few."""
@@ -35,7 +35,7 @@ class Change(Arrays):
     """What one pass of a cut step changed."""
 
     flagged: IntArray
-    """Nodes that came to lie on the sheet, shape (room,)."""
+    """Nodes that came to lie on the cut surface, shape (room,)."""
     dirty: IntArray
     """Tetrahedra that were split or got another node, with repeats; shape (room,)."""
     faces: IntArray

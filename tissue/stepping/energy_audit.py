@@ -6,7 +6,7 @@ import numpy as np
 
 from tissue.blade.blade_state import clear_works
 from tissue.blade.edge import Edge
-from tissue.blade.faces_contact import sides_energy
+from tissue.blade.faces_contact import faces_energy
 from tissue.blade.forces import edge_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -89,7 +89,7 @@ def _write_amounts(
         out[1] = kinetic_energy(body)
         out[2] = potential_energy(body, context.surroundings.gravity)
     totals, contacts = blade.totals, context.contacts
-    out[3], out[4] = edge_energy(blade, body, edge, when), sides_energy(blade.sides)
+    out[3], out[4] = edge_energy(blade, body, edge, when), faces_energy(blade.sides)
     out[5], out[6] = contacts.stored, contacts.work
     out[7], out[8] = totals.work_of_blade, context.supports.work
     out[9], out[10] = context.damping.dissipated, totals.work_of_cutting

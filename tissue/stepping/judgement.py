@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from tissue.blade.edge import Edge
-from tissue.blade.faces_contact import sides_energy
+from tissue.blade.faces_contact import faces_energy
 from tissue.blade.forces import edge_energy
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes, kernel
@@ -223,7 +223,7 @@ def energy_in_springs(context: StepContext, edge: Edge, when: float) -> float:
         when: Instant of it, as a fraction.
     """
     body, blade, attachments = context.body, context.blade, context.attachments
-    held: float = edge_energy(blade, body, edge, when) + sides_energy(blade.sides)
+    held: float = edge_energy(blade, body, edge, when) + faces_energy(blade.sides)
     held += context.contacts.stored
     held += attached_energy(attachments, body.positions, 0, len(attachments.nodes))
     energy: float = elastic_energy(context.elastic, body) + held

@@ -14,11 +14,11 @@ from tissue.blade.faces_contact import (
     POINTS,
     blade_profile,
     contact_point,
-    new_side_contacts,
+    new_face_contacts,
     penetration,
     with_more_faces,
 )
-from tissue.blade.faces_forces import add_side_stiffness, apply_side_forces, apply_sliding
+from tissue.blade.faces_forces import add_face_stiffness, apply_face_forces, apply_sliding
 from tissue.blade.faces_search import (
     find_faces,
     forget_cells,
@@ -76,7 +76,7 @@ class Pressed:
     def press(self, edge):
         self.forces[:] = 0.0
         x = self.body.positions
-        apply_side_forces(self.blade, motion_at(edge, 1.0), x, 1.0, 1.0, self.forces)
+        apply_face_forces(self.blade, motion_at(edge, 1.0), x, 1.0, 1.0, self.forces)
         return self.forces.sum(axis=0)
 
     def slide(self, edge):
@@ -89,7 +89,7 @@ def pressed():
 
 
 def test_the_profile_is_a_wedge_with_a_back_and_two_ends():
-    sides = new_side_contacts(SHAPE, MATERIAL, NODE_SIZE, 1)
+    sides = new_face_contacts(SHAPE, MATERIAL, NODE_SIZE, 1)
     reach = [
         blade_profile(sides, LENGTH, 0.0, BladeCoordinates(a, s, 0.0)).height
         for a, s in [(0.015, 0.0), (0.015, 2e-3), (0.015, 9e-3), (0.015, 0.02), (0.0, 9e-3)]
@@ -189,7 +189,7 @@ def test_the_force_is_the_slope_of_the_energy(pressed):
         after = (end.tip_t1, end.heel_t1, end.forward_t1)
         moving = Edge(start.tip_t0, start.heel_t0, start.forward_t0, *after)
         x, at_half = pressed.body.positions, motion_at(moving, 0.5)
-        apply_side_forces(pressed.blade, at_half, x, 1.0, 1.0, pressed.forces)
+        apply_face_forces(pressed.blade, at_half, x, 1.0, 1.0, pressed.forces)
     pressed.slide(edge_at(0.0108))
     stored = pressed.sides.states.energy[pressed.rows()].sum()
     assert pressed.totals.work_of_blade == pytest.approx(stored, rel=1e-4)
@@ -222,7 +222,7 @@ def test_a_search_adds_no_energy_to_a_face_that_changes_size_under_the_blade(pre
 
 def test_side_contacts_add_stiffness_to_their_nodes(pressed):
     rows = np.zeros_like(pressed.body.rest)
-    add_side_stiffness(pressed.sides, rows)
+    add_face_stiffness(pressed.sides, rows)
     area = POINTS * pressed.sides.states.area[pressed.rows()].sum()
     assert rows[:, 0].sum() >= pressed.sides.stiffness * area
 

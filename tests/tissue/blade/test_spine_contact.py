@@ -17,22 +17,22 @@ from tissue.blade.spine_contact import (
     PRESSING,
     STIFFEST,
     TIP_END,
-    blunt_side,
     fit_stiffness,
     measure_tip_speeds,
-    new_blunt_contacts,
+    new_spine_contacts,
     press_energy,
     press_force,
     press_of,
+    spine_side,
     strip_law_of,
     strip_stiffness,
     touched_point,
 )
 from tissue.blade.spine_forces import (
-    add_blunt_stiffness,
-    apply_blunt_forces,
-    clear_blunt_forces,
-    slip_blunt_sides,
+    add_spine_stiffness,
+    apply_spine_forces,
+    clear_spine_forces,
+    slip_spine,
 )
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.mesh.body import build_body
@@ -66,10 +66,10 @@ class PressingBlade:
         self.body = build_body(MESH, None, None)
         self.visits = no_visits(len(MESH.positions), len(MESH.tetrahedra))
         state = new_blade_state(new_anchors(2, EDGE_LENGTH, 1e3), SHAPE, material, NODE_SIZE, 48)
-        blunt = new_blunt_contacts(SHAPE, EDGE_LENGTH, material, NODE_SIZE)
-        self.blade, self.blunt = state.replaced(blunt=blunt), blunt
-        self.k = int(np.flatnonzero(blunt.side == side)[1])
-        at = blunt_side(blunt, pose_at(edge_of(side, 0.0), 1.0), self.k).at
+        spine = new_spine_contacts(SHAPE, EDGE_LENGTH, material, NODE_SIZE)
+        self.blade, self.spine = state.replaced(spine=spine), spine
+        self.k = int(np.flatnonzero(spine.side == side)[1])
+        at = spine_side(spine, pose_at(edge_of(side, 0.0), 1.0), self.k).at
         self._touch(np.array(at))
         self.forces = np.zeros_like(self.body.rest)
 
@@ -79,34 +79,34 @@ class PressingBlade:
             corners = np.column_stack([body.rest[nodes], np.ones(4)]).T
             weights = np.linalg.solve(corners, [*p, 1.0])
             if weights.min() > -1e-12 and np.isclose(body.rest[nodes, 2], 0.02).sum() == 3:
-                self.blunt.tetrahedron[k], self.blunt.weights[k] = t, weights
-                self.blunt.rest[k], self.blunt.state[k] = p, PRESSING
-                self.blunt.n_pressing = 1
+                self.spine.tetrahedron[k], self.spine.weights[k] = t, weights
+                self.spine.rest[k], self.spine.state[k] = p, PRESSING
+                self.spine.n_pressing = 1
                 return
         raise AssertionError(p)
 
     def press(self, edge):
-        blunt, pose = self.blunt, pose_at(edge, 1.0)
-        side = blunt_side(blunt, pose, self.k)
-        point = touched_point(blunt, self.body, self.body.positions, self.k)
-        return press_of(blunt, self.k, side, pose.normal, point, self.blade.toughness)
+        spine, pose = self.spine, pose_at(edge, 1.0)
+        side = spine_side(spine, pose, self.k)
+        point = touched_point(spine, self.body, self.body.positions, self.k)
+        return press_of(spine, self.k, side, pose.normal, point, self.blade.toughness)
 
     def energy(self, edge):
-        return press_energy(self.blunt, self.k, self.press(edge))
+        return press_energy(self.spine, self.k, self.press(edge))
 
     def force(self, edge):
         pose = pose_at(edge, 1.0)
-        side = blunt_side(self.blunt, pose, self.k)
-        return press_force(self.blunt, self.k, side, pose.normal, self.press(edge))
+        side = spine_side(self.spine, pose, self.k)
+        return press_force(self.spine, self.k, side, pose.normal, self.press(edge))
 
     def apply(self, edge):
-        apply_blunt_forces(
+        apply_spine_forces(
             self.blade, self.body, motion_at(edge, 1.0), self.body.positions, 1.0, 1.0, self.forces
         )
         return self.blade.totals
 
     def slip(self, edge):
-        slip_blunt_sides(self.blade, self.body, self.visits, pose_at(edge, 1.0))
+        slip_spine(self.blade, self.body, self.visits, pose_at(edge, 1.0))
 
 
 @pytest.mark.parametrize("side", LEADS)
@@ -114,7 +114,7 @@ def test_a_side_presses_with_its_stiffness_times_depth(side):
     held = PressingBlade(side)
     depth = 1e-4
     force = held.force(edge_of(side, depth))
-    assert force == pytest.approx((0.0, 0.0, -held.blunt.stiffness[held.k] * depth), abs=1e-12)
+    assert force == pytest.approx((0.0, 0.0, -held.spine.stiffness[held.k] * depth), abs=1e-12)
 
 
 @pytest.mark.parametrize("side", LEADS)
@@ -130,11 +130,11 @@ def test_the_force_is_the_gradient_of_the_energy(side, beside):
     held, h = PressingBlade(side), 1e-8
     edge = edge_of(side, 1e-4, beside)
     force, numeric = held.force(edge), []
-    node = held.body.tetrahedra[held.blunt.tetrahedron[held.k], 0]
-    weight = held.blunt.weights[held.k, 0]
+    node = held.body.tetrahedra[held.spine.tetrahedron[held.k], 0]
+    weight = held.spine.weights[held.k, 0]
     if weight == 0.0:
-        node = held.body.tetrahedra[held.blunt.tetrahedron[held.k], 1]
-        weight = held.blunt.weights[held.k, 1]
+        node = held.body.tetrahedra[held.spine.tetrahedron[held.k], 1]
+        weight = held.spine.weights[held.k, 1]
     for axis in range(2):  # along the skin the limit of friction stays
         ends = []
         for sign in (-1.0, 1.0):
@@ -148,7 +148,7 @@ def test_the_force_is_the_gradient_of_the_energy(side, beside):
 def test_friction_stays_below_coulombs_limit_and_what_slides_is_lost_to_it():
     held, depth = PressingBlade(BACK), 1e-4
     edge = edge_of(BACK, depth, (3e-4, 4e-4))
-    push = held.blunt.stiffness[held.k] * depth
+    push = held.spine.stiffness[held.k] * depth
     force = held.force(edge)
     assert math.hypot(force.x, force.y) == pytest.approx(0.5 * push)
     before = held.energy(edge)
@@ -166,21 +166,21 @@ def test_force_and_torque_on_blade_and_tissue_are_opposite(side):
     torque = np.cross(held.body.positions[:n], held.forces[:n]).sum(axis=0)
     np.testing.assert_allclose(held.forces.sum(axis=0), -totals.impulse, atol=1e-15)
     np.testing.assert_allclose(torque, -totals.angular_impulse, atol=1e-15)
-    clear_blunt_forces(held.blunt, held.body, held.forces)
+    clear_spine_forces(held.spine, held.body, held.forces)
     assert not held.forces.any()
 
 
 def test_the_tip_holds_up_to_the_toughness_of_the_skin_then_pierces_at_that_of_the_rest():
     held = PressingBlade(TIP_END)
-    length, stiffness = held.blunt.length[held.k], held.blunt.stiffness[held.k]
+    length, stiffness = held.spine.length[held.k], held.spine.stiffness[held.k]
     limit = 30.0 * length / stiffness
     held.slip(edge_of(TIP_END, 0.99 * limit))
-    assert held.blunt.state[held.k] == PRESSING
+    assert held.spine.state[held.k] == PRESSING
     edge = edge_of(TIP_END, 1.01 * limit)
     before = held.energy(edge)
     assert held.force(edge).z == pytest.approx(-30.0 * length)
     held.slip(edge)
-    assert held.blunt.state[held.k] == PIERCING
+    assert held.spine.state[held.k] == PIERCING
     assert held.force(edge).z == pytest.approx(-20.0 * length)
     totals = held.blade.totals
     assert totals.work_of_cutting == pytest.approx(20.0 * length * (1.01 * limit - limit / 1.5))
@@ -191,16 +191,16 @@ def test_the_tip_holds_up_to_the_toughness_of_the_skin_then_pierces_at_that_of_t
 def test_a_faster_tip_pierces_at_a_higher_toughness():
     law = Material(toughness=20.0, skin_toughness=30.0, toughness_exponent=1.0, toughness_speed=0.1)
     held = PressingBlade(TIP_END, law)
-    length, stiffness = held.blunt.length[held.k], held.blunt.stiffness[held.k]
+    length, stiffness = held.spine.length[held.k], held.spine.stiffness[held.k]
     deep = edge_of(TIP_END, 60.0 * length / stiffness)
     at_first = edge_of(TIP_END, 60.0 * length / stiffness - 1e-4)
     edge = Edge(
         *(at_first.tip_t0, at_first.heel_t0, at_first.forward_t0),
         *(deep.tip_t1, deep.heel_t1, deep.forward_t1),
     )
-    measure_tip_speeds(held.blunt, edge, 1e-3)  # 0.1 mm in 1 ms
-    np.testing.assert_allclose(held.blunt.speed[held.blunt.side == TIP_END], 0.1)
-    assert not held.blunt.speed[held.blunt.side != TIP_END].any()
+    measure_tip_speeds(held.spine, edge, 1e-3)  # 0.1 mm in 1 ms
+    np.testing.assert_allclose(held.spine.speed[held.spine.side == TIP_END], 0.1)
+    assert not held.spine.speed[held.spine.side != TIP_END].any()
     held.slip(edge)
     assert held.force(edge).z == pytest.approx(-40.0 * length)
     totals = held.blade.totals
@@ -209,17 +209,17 @@ def test_a_faster_tip_pierces_at_a_higher_toughness():
 
 def test_the_rows_of_stiffness_add_up_to_that_of_the_samples_that_press():
     held = PressingBlade(BACK)
-    add_blunt_stiffness(held.blunt, held.body, held.forces)
-    assert held.forces.sum() == pytest.approx(held.blunt.stiffness[held.k])
+    add_spine_stiffness(held.spine, held.body, held.forces)
+    assert held.forces.sum() == pytest.approx(held.spine.stiffness[held.k])
 
 
 def test_the_samples_cover_the_back_and_both_ends():
-    blunt = new_blunt_contacts(SHAPE, EDGE_LENGTH, MATERIAL, NODE_SIZE)
+    spine = new_spine_contacts(SHAPE, EDGE_LENGTH, MATERIAL, NODE_SIZE)
     for side, size in ((BACK, EDGE_LENGTH), (HEEL_END, SHAPE.height), (TIP_END, SHAPE.height)):
-        assert blunt.length[blunt.side == side].sum() == pytest.approx(size)
+        assert spine.length[spine.side == side].sum() == pytest.approx(size)
     pose = pose_at(edge_of(BACK, 0.0), 1.0)
-    for k in range(len(blunt.state)):
-        side = blunt_side(blunt, pose, k)
+    for k in range(len(spine.state)):
+        side = spine_side(spine, pose, k)
         assert dot(side.outward, side.beside) == dot(side.outward, pose.normal) == 0.0
 
 
@@ -238,9 +238,9 @@ def test_a_sample_between_rows_of_nodes_is_softer_than_on_a_row():
     """Nodes of the skin are 10 mm apart: 1 mm from a row it is 9 and 1 mm from two of them."""
     held = PressingBlade(BACK)
     pose = pose_at(edge_of(BACK, 0.0), 1.0)
-    fit_stiffness(held.blunt, held.body, held.k, pose.normal)
-    law, length = held.blunt.law, held.blunt.length[held.k]
-    assert held.blunt.stiffness[held.k] == pytest.approx(strip_stiffness(law, 9e-6) * length)
+    fit_stiffness(held.spine, held.body, held.k, pose.normal)
+    law, length = held.spine.law, held.spine.length[held.k]
+    assert held.spine.stiffness[held.k] == pytest.approx(strip_stiffness(law, 9e-6) * length)
     assert strip_stiffness(law, 9e-6) < strip_stiffness(law, 0.0)
 
 
@@ -248,5 +248,5 @@ def test_a_touched_point_moves_with_its_face():
     held = PressingBlade(BACK)
     moved = np.array([0.001, 0.002, 0.003])
     held.body.positions[: held.body.n_nodes] += moved
-    found = touched_point(held.blunt, held.body, held.body.positions, held.k)
-    np.testing.assert_allclose(found, vec3(held.blunt.rest, held.k) + moved, atol=1e-15)
+    found = touched_point(held.spine, held.body, held.body.positions, held.k)
+    np.testing.assert_allclose(found, vec3(held.spine.rest, held.k) + moved, atol=1e-15)

@@ -31,7 +31,7 @@ from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, line_of_sample, next_event
-from tissue.cutting.cut_surface import grown_sheet, new_sheet
+from tissue.cutting.cut_surface import grown_cut_surface, new_cut_surface
 from tissue.cutting.workspace import (
     Cut,
     SnapLimits,
@@ -92,9 +92,9 @@ class PaperScheme:
         self._placing = new_placing()
         self._references = np.zeros((5, N_LOCAL_NODES), np.int64)
         self._counts = no_counts()
-        # For collision detection. The sheet stays empty: this scheme moves no node to it.
+        # For collision detection. The cut surface stays empty: this scheme moves no node to it.
         self._scratch = new_cut_scratch(0)
-        self._sheet = new_sheet(len(body.rest), len(body.tetrahedra))
+        self._surface = new_cut_surface(len(body.rest), len(body.tetrahedra))
         self._limits = SnapLimits(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
 
     @property
@@ -150,7 +150,7 @@ class PaperScheme:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
+        self._surface = grown_cut_surface(self._surface, n_nodes, n_tetrahedra)
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return counts of what was done so far."""
@@ -172,7 +172,7 @@ class PaperScheme:
         return Cut(
             body=body,
             visits=visits,
-            sheet=self._sheet,
+            surface=self._surface,
             path=path,
             change=self.change,
             scratch=self._scratch,
