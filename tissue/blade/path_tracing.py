@@ -187,8 +187,7 @@ def forget_path(path: Path) -> None:
 
 @kernel
 def _behind(body: Body, p: Vec3, margin: float, ahead: Vec3, seed: int) -> Vec3:
-    """Return where a cut surface begins that the edge enters at `p` [m]: outside the skin, or in a
-    slit.
+    """Return where the cut begins that the edge enters at `p` [m]: outside the skin, or in a slit.
 
     In the midst of tissue, where a tip was driven in, it begins at `p` itself.
     """

@@ -116,7 +116,7 @@ def intrinsic(
     def register(build: _Function) -> _Function:
         def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             arguments = [
-                Array(context, builder, kind, value) if isinstance(kind, types.Array) else value
+                Operand(context, builder, kind, value) if isinstance(kind, types.Array) else value
                 for kind, value in zip(signature.args, values, strict=True)
             ]
             made = build(builder, *arguments)
@@ -128,7 +128,7 @@ def intrinsic(
     return register
 
 
-class Array:
+class Operand:
     """An array argument: where its elements are."""
 
     def __init__(self, context: Any, builder: Any, kind: types.Array, value: Any) -> None:
@@ -175,10 +175,10 @@ def lanes(value: float) -> Lanes:
 
 @intrinsic(lanes, types.Float)
 def _lanes(builder: Any, value: Any) -> Any:
-    return everywhere(builder, value, LANES_IR)
+    return in_all_lanes(builder, value, LANES_IR)
 
 
-def everywhere(builder: Any, value: Any, kind: Any) -> Any:
+def in_all_lanes(builder: Any, value: Any, kind: Any) -> Any:
     """Return a vector that holds `value` in all lanes."""
     one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(I32, 0))
     return shuffled(builder, one, one, [0] * kind.count)
@@ -190,7 +190,7 @@ def load_lanes(array: FloatArray, i: int) -> Lanes:
 
 
 @intrinsic(load_lanes, types.Array, types.Integer)
-def _load(builder: Any, array: Array, i: Any) -> Any:
+def _load(builder: Any, array: Operand, i: Any) -> Any:
     return builder.load(builder.bitcast(array.at(i), LANES_IR.as_pointer()), align=8)
 
 
@@ -201,7 +201,7 @@ def store_lanes(array: FloatArray, i: int, values: Lanes) -> None:
 
 @intrinsic(store_lanes, types.Array, types.Integer, LANES, result=types.void)
 @intrinsic(store_lanes, types.Array, types.Integer, UNFUSED, result=types.void)
-def _store(builder: Any, array: Array, i: Any, values: Any) -> None:
+def _store(builder: Any, array: Operand, i: Any, values: Any) -> None:
     builder.store(values, builder.bitcast(array.at(i), LANES_IR.as_pointer()), align=8)
 
 
@@ -237,7 +237,7 @@ def times(value: float, a: Point) -> Point:
 
 @intrinsic(times, types.Float, POINT, result=POINT)
 def _times(builder: Any, value: Any, a: Any) -> Any:
-    return builder.fmul(everywhere(builder, value, POINT_IR), a, flags=("contract",))
+    return builder.fmul(in_all_lanes(builder, value, POINT_IR), a, flags=("contract",))
 
 
 def point(points: FloatArray, i: int) -> Point:
@@ -246,7 +246,7 @@ def point(points: FloatArray, i: int) -> Point:
 
 
 @intrinsic(point, types.Array, types.Integer, result=POINT)
-def _load_point(builder: Any, points: Array, i: Any) -> Any:
+def _load_point(builder: Any, points: Operand, i: Any) -> Any:
     pointer = builder.bitcast(points.at(i, 3), POINT_IR.as_pointer())
     kind = ir.FunctionType(POINT_IR, [POINT_IR.as_pointer(), I32, _XYZ.type, POINT_IR])
     function = declared(builder.module, "llvm.masked.load.v4f64.p0v4f64", kind)
@@ -260,7 +260,7 @@ def store_point(points: FloatArray, i: int, a: Point) -> None:
 
 
 @intrinsic(store_point, types.Array, types.Integer, POINT, result=types.void)
-def _store_point(builder: Any, points: Array, i: Any, a: Any) -> None:
+def _store_point(builder: Any, points: Operand, i: Any, a: Any) -> None:
     # As two stores: one of four lanes with a mask takes 6 ns here, seven times as long.
     pointer = points.at(i, 3)
     low = shuffled(builder, a, a, [0, 1])
@@ -303,7 +303,7 @@ def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lane
 
 
 @intrinsic(eight_points, types.Array, types.Array, types.Integer, result=THREE_LANES)
-def _eight_points(builder: Any, points: Array, of: Array, i: Any) -> Any:
+def _eight_points(builder: Any, points: Operand, of: Operand, i: Any) -> Any:
     rows = []
     for k in range(WIDTH):
         row = points.at(builder.load(of.at(builder.add(i, i.type(k)))), 3)

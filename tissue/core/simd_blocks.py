@@ -26,11 +26,11 @@ from tissue.core.simd import (
     POINT,
     POINT_IR,
     SECOND,
-    Array,
     Lanes,
     LanesType,
+    Operand,
     Point,
-    everywhere,
+    in_all_lanes,
     intrinsic,
     shuffled,
     tuple_of,
@@ -49,7 +49,7 @@ def _kind_of(array: types.Array, *_: types.Type) -> LanesType:
     return LANES_OF_SINGLES if array.dtype == types.float32 else LANES
 
 
-def _vector_of(array: Array) -> Any:
+def _vector_of(array: Operand) -> Any:
     """Return LLVM's type of the vectors of an array."""
     return ir.VectorType(array.element, 16 if isinstance(array.element, ir.FloatType) else 8)
 
@@ -60,7 +60,7 @@ def width_of(array: FloatArray) -> int:
 
 
 @intrinsic(width_of, types.Array, result=types.int64)
-def _width_of(_: Any, array: Array) -> Any:
+def _width_of(_: Any, array: Operand) -> Any:
     return ir.Constant(I64, _vector_of(array).count)
 
 
@@ -75,7 +75,7 @@ def load_block(array: FloatArray, i: int) -> Lanes:
 
 
 @intrinsic(load_block, types.Array, types.Integer, result=_kind_of)
-def _load_block(builder: Any, array: Array, i: Any) -> Any:
+def _load_block(builder: Any, array: Operand, i: Any) -> Any:
     pointer = builder.bitcast(array.at(i), _vector_of(array).as_pointer())
     return builder.load(pointer, align=_size_of(array.element))
 
@@ -94,10 +94,10 @@ for _kind in _BOTH:
 
     @intrinsic(alike, types.Float, _kind, result=_kind)
     def _alike(builder: Any, value: Any, a: Any) -> Any:
-        return everywhere(builder, _converted(builder, value, a.type.element), a.type)
+        return in_all_lanes(builder, _converted(builder, value, a.type.element), a.type)
 
     @intrinsic(store_block, types.Array, types.Integer, _kind, result=types.void)
-    def _store_block(builder: Any, array: Array, i: Any, values: Any) -> None:
+    def _store_block(builder: Any, array: Operand, i: Any, values: Any) -> None:
         pointer = builder.bitcast(array.at(i), values.type.as_pointer())
         builder.store(values, pointer, align=_size_of(array.element))
 
@@ -115,7 +115,7 @@ def gathered_alike(a: Lanes, values: FloatArray, of: SlotArray, i: int) -> Lanes
 for _kind in _BOTH:
 
     @intrinsic(gathered_alike, _kind, types.Array, types.Array, types.Integer, result=_kind)
-    def _gathered_alike(builder: Any, a: Any, values: Array, of: Array, i: Any) -> Any:
+    def _gathered_alike(builder: Any, a: Any, values: Operand, of: Operand, i: Any) -> Any:
         made = ir.Constant(a.type, ir.Undefined)
         for lane in range(a.type.count):
             place = builder.load(of.at(builder.add(i, i.type(lane))))
@@ -146,14 +146,14 @@ def store_row(rows: FloatArray, i: int, a: Point) -> None:
 
 
 @intrinsic(store_row, types.Array, types.Integer, POINT, result=types.void)
-def _store_row(builder: Any, rows: Array, i: Any, a: Any) -> None:
+def _store_row(builder: Any, rows: Operand, i: Any, a: Any) -> None:
     kind = ir.VectorType(rows.element, 4)
     values = a if kind == POINT_IR else builder.fptrunc(a, kind)
     pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
     builder.store(values, pointer, align=4 * _size_of(rows.element))
 
 
-def _row(builder: Any, rows: Array, i: Any) -> Any:
+def _row(builder: Any, rows: Operand, i: Any) -> Any:
     kind = ir.VectorType(rows.element, 4)
     pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
     return builder.load(pointer, align=4 * _size_of(rows.element))
@@ -165,9 +165,9 @@ def store_everywhere(rows: FloatArray, i: int, value: float) -> None:
 
 
 @intrinsic(store_everywhere, types.Array, types.Integer, types.Float, result=types.void)
-def _store_everywhere(builder: Any, rows: Array, i: Any, value: Any) -> None:
+def _store_everywhere(builder: Any, rows: Operand, i: Any, value: Any) -> None:
     kind = ir.VectorType(rows.element, 4)
-    values = everywhere(builder, _converted(builder, value, rows.element), kind)
+    values = in_all_lanes(builder, _converted(builder, value, rows.element), kind)
     pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
     builder.store(values, pointer, align=4 * _size_of(rows.element))
 
@@ -183,7 +183,7 @@ def values_of_rows(rows: FloatArray, of: SlotArray, i: int) -> Lanes:
 
 
 @intrinsic(values_of_rows, types.Array, types.Array, types.Integer, result=_kind_of)
-def _values_of_rows(builder: Any, rows: Array, of: Array, i: Any) -> Any:
+def _values_of_rows(builder: Any, rows: Operand, of: Operand, i: Any) -> Any:
     n = _vector_of(rows).count
     found = [_row(builder, rows, builder.load(of.at(builder.add(i, i.type(k))))) for k in range(n)]
     for lane in range(1, 4):
@@ -205,7 +205,7 @@ def sum_of_eight_rows(rows: FloatArray, of: SlotArray, i: int) -> Point:
 
 
 @intrinsic(sum_of_eight_rows, types.Array, types.Array, types.Integer, result=POINT)
-def _sum_of_eight_rows(builder: Any, rows: Array, of: Array, i: Any) -> Any:
+def _sum_of_eight_rows(builder: Any, rows: Operand, of: Operand, i: Any) -> Any:
     places = [builder.load(of.at(builder.add(i, i.type(k)))) for k in range(8)]
     total = fold_in_pairs([_row(builder, rows, place) for place in places], builder.fadd)
     return total if total.type == POINT_IR else builder.fpext(total, POINT_IR)
@@ -222,7 +222,7 @@ def _three(rows: types.Array, *_: types.Type) -> Any:
 
 
 @intrinsic(points_of_rows, types.Array, types.Array, types.Integer, result=_three)
-def _points_of_rows(builder: Any, rows: Array, of: Array, i: Any) -> Any:
+def _points_of_rows(builder: Any, rows: Operand, of: Operand, i: Any) -> Any:
     def mixed(a: Any, b: Any, order: Any) -> Any:
         return shuffled(builder, a, b, order)
 
@@ -271,7 +271,7 @@ def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
 for _kind in _BOTH:
 
     @intrinsic(store_rows, types.Array, types.Integer, _kind, _kind, _kind, result=types.void)
-    def _store_rows(builder: Any, rows: Array, i: Any, x: Any, y: Any, z: Any) -> None:
+    def _store_rows(builder: Any, rows: Operand, i: Any, x: Any, y: Any, z: Any) -> None:
         n = x.type.count
         first, second = (EVEN, ODD) if n == 8 else (_LOW, _HIGH)
         low, high = shuffled(builder, x, y, first), shuffled(builder, x, y, second)

@@ -22,8 +22,8 @@ from tissue.core.simd import (
     THREE_LANES,
     UNFUSED,
     WIDTH,
-    Array,
     Lanes,
+    Operand,
     declared,
     intrinsic,
     shuffled,
@@ -47,7 +47,7 @@ def points_of_column(points: FloatArray, of: IntArray, i: int, q: int) -> Any:
 @intrinsic(
     points_of_column, types.Array, types.Array, types.Integer, types.Integer, result=THREE_LANES
 )
-def _points_of_column(builder: Any, points: Array, of: Array, i: Any, q: Any) -> Any:
+def _points_of_column(builder: Any, points: Operand, of: Operand, i: Any, q: Any) -> Any:
     first = of.at(i, 4)
     rows = []
     for k in range(WIDTH):
@@ -64,7 +64,7 @@ def rows_of_three(rows: FloatArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
 
 
 @intrinsic(rows_of_three, types.Array, types.Integer, result=THREE_LANES)
-def _rows_of_three(builder: Any, rows: Array, i: Any) -> Any:
+def _rows_of_three(builder: Any, rows: Operand, i: Any) -> Any:
     a, b, c = _vectors(builder, rows.at(i, 3), 3)
     columns = []
     for k, order in enumerate(([0, 1, 2, 3, 4, 5, 10, 13], [0, 1, 2, 3, 4, 8, 11, 14])):
@@ -90,7 +90,7 @@ def store_rows_of_three(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) 
 
 
 @intrinsic(store_rows_of_three, types.Array, types.Integer, LANES, LANES, LANES, result=types.void)
-def _store_rows_of_three(builder: Any, rows: Array, i: Any, x: Any, y: Any, z: Any) -> None:
+def _store_rows_of_three(builder: Any, rows: Operand, i: Any, x: Any, y: Any, z: Any) -> None:
     # Number 3 r + c of all is column c of row r.
     vectors = []
     for first in range(0, 3 * WIDTH, WIDTH):
@@ -108,7 +108,7 @@ def rows_of_four(rows: FloatArray, i: int) -> Any:
 
 
 @intrinsic(rows_of_four, types.Array, types.Integer, result=_FOUR)
-def _rows_of_four(builder: Any, rows: Array, i: Any) -> Any:
+def _rows_of_four(builder: Any, rows: Operand, i: Any) -> Any:
     a, b, c, d = _vectors(builder, rows.at(i, 4), 4)
     columns = []
     for k in range(4):
@@ -135,7 +135,9 @@ def store_rows_of_four(rows: FloatArray, i: int, a: Lanes, b: Lanes, c: Lanes, d
 
 @intrinsic(store_rows_of_four, types.Array, types.Integer, *[LANES] * 4, result=types.void)
 @intrinsic(store_rows_of_four, types.Array, types.Integer, *[UNFUSED] * 4, result=types.void)
-def _store_rows_of_four(builder: Any, rows: Array, i: Any, a: Any, b: Any, c: Any, d: Any) -> None:
+def _store_rows_of_four(
+    builder: Any, rows: Operand, i: Any, a: Any, b: Any, c: Any, d: Any
+) -> None:
     vectors = []
     for order in (_SPREAD, _BEHIND):
         ab, cd = shuffled(builder, a, b, order), shuffled(builder, c, d, order)
@@ -159,7 +161,7 @@ def add_to_row(rows: FloatArray, i: int, factor: float, x: float, y: float, z: f
 
 
 @intrinsic(add_to_row, types.Array, types.Integer, *[types.Float] * 4, result=types.void)
-def _add_to_row(builder: Any, rows: Array, i: Any, factor: Any, x: Any, y: Any, z: Any) -> None:
+def _add_to_row(builder: Any, rows: Operand, i: Any, factor: Any, x: Any, y: Any, z: Any) -> None:
     first, pair = rows.at(i, 3), ir.VectorType(ir.DoubleType(), 2)
     made = ir.Constant(pair, ir.Undefined)
     both, twice = made, made
@@ -193,7 +195,7 @@ def sum_of_eight(values: FloatArray, of: SlotArray, i: int) -> float:
 
 
 @intrinsic(sum_of_eight, types.Array, types.Array, types.Integer, result=types.float64)
-def _sum_of_eight(builder: Any, values: Array, of: Array, i: Any) -> Any:
+def _sum_of_eight(builder: Any, values: Operand, of: Operand, i: Any) -> Any:
     places = (builder.load(of.at(builder.add(i, i.type(k)))) for k in range(WIDTH))
     total = fold_in_pairs([builder.load(values.at(place)) for place in places], builder.fadd)
     return total if total.type == ir.DoubleType() else builder.fpext(total, ir.DoubleType())

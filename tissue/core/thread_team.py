@@ -21,7 +21,7 @@ from numba.core import types
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.core.simd import I32, Array, aligned, declared, intrinsic
+from tissue.core.simd import I32, Operand, aligned, declared, intrinsic
 from tissue.core.structs import Arrays, FloatCell, IntCell
 
 _ORDER = "seq_cst"
@@ -153,7 +153,7 @@ def load_shared(numbers: IntArray, i: int) -> int:
 
 
 @intrinsic(load_shared, _NUMBERS, types.Integer, result=types.int64)
-def _load(builder: Any, numbers: Array, i: Any) -> Any:
+def _load(builder: Any, numbers: Operand, i: Any) -> Any:
     return builder.load_atomic(numbers.at(i), _ORDER, _BYTES)
 
 
@@ -163,7 +163,7 @@ def store_shared(numbers: IntArray, i: int, value: int) -> None:
 
 
 @intrinsic(store_shared, _NUMBERS, types.Integer, types.Integer, result=types.void)
-def _store(builder: Any, numbers: Array, i: Any, value: Any) -> None:
+def _store(builder: Any, numbers: Operand, i: Any, value: Any) -> None:
     builder.store_atomic(value, numbers.at(i), _ORDER, _BYTES)
 
 
@@ -173,7 +173,7 @@ def add_shared(numbers: IntArray, i: int, value: int) -> None:
 
 
 @intrinsic(add_shared, _NUMBERS, types.Integer, types.Integer, result=types.void)
-def _add(builder: Any, numbers: Array, i: Any, value: Any) -> None:
+def _add(builder: Any, numbers: Operand, i: Any, value: Any) -> None:
     builder.atomic_rmw("add", numbers.at(i), value, _ORDER)
 
 
@@ -188,7 +188,7 @@ def replace_shared(numbers: IntArray, i: int, expected: int, value: int) -> bool
 @intrinsic(
     replace_shared, _NUMBERS, types.Integer, types.Integer, types.Integer, result=types.boolean
 )
-def _replace(builder: Any, numbers: Array, i: Any, expected: Any, value: Any) -> Any:
+def _replace(builder: Any, numbers: Operand, i: Any, expected: Any, value: Any) -> Any:
     found = builder.cmpxchg(numbers.at(i), expected, value, _ORDER, _ORDER)
     return builder.extract_value(found, 1)
 

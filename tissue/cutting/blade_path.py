@@ -93,8 +93,7 @@ class Plane(NamedTuple):
 
 @kernel
 def plane_at(path: Path, k: int, p: Vec3) -> Plane:
-    """Return the plane of the cut surface at the point of segment `k` of the edge nearest to `p`
-    [m]."""
+    """Return the plane of the cut at the point of segment `k` of the edge nearest to `p` [m]."""
     tip = vec3(path.t1, k)
     along = sub(vec3(path.t1, k + 1), tip)
     normal = normalised(cross(vec3(path.forward, k), along))
