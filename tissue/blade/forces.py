@@ -4,15 +4,17 @@ from tissue.blade.blade_state import BladeState, clear_impulses
 from tissue.blade.edge import Edge, is_sound, motion_at, pose_at
 from tissue.blade.edge_anchors import (
     ANCHORED,
-    add_anchor_stiffness,
     anchors_energy,
-    clear_anchor_forces,
-    highest_anchor_frequency,
     holding_node,
     measure_speeds,
     n_holding_nodes,
 )
-from tissue.blade.edge_forces import apply_edge_forces
+from tissue.blade.edge_forces import (
+    add_anchor_stiffness,
+    apply_edge_forces,
+    clear_anchor_forces,
+    highest_anchor_frequency,
+)
 from tissue.blade.faces_forces import (
     add_face_stiffness,
     apply_face_forces,

@@ -2,8 +2,7 @@
 
 In the order in which they are best read:
 
-    incision               from the first contact of the blade to the last: detect, cut, open, end
-    scheme                 what any scheme of cutting does, in the stages of the paper's Table 1
+    incision               from the first contact of the blade to the last; the scheme
     blade_path             the path of the cutting edge through the material in one step
     collision_detection    CD: the active tetrahedra, and the edges that the blade crossed
     cut_surface            the cut surface that the blade leaves behind, and the two sides of it
@@ -13,8 +12,6 @@ In the order in which they are best read:
     crack_front            the edges of the mesh along which the cut ends
     bridging               tetrahedra that still bridge the cut behind the blade
     separation             cut the faces on the cut surface and double their nodes
-    cut_pass               the files above in one pass
-    scheme_choice          the scheme that a user chose
     stellar_scheme         our scheme, made of the files above
     bielser_1998           the scheme of Bielser, Maiwald and Gross
 """

@@ -15,12 +15,11 @@ from tissue.blade.edge_anchors import (
     anchor_stiffness,
     anchored_length,
     anchors_energy,
-    clear_anchor_forces,
     is_engaged,
     measure_speeds,
     new_anchors,
 )
-from tissue.blade.edge_forces import apply_edge_forces
+from tissue.blade.edge_forces import apply_edge_forces, clear_anchor_forces
 from tissue.blade.edge_search import (
     anchor_beside,
     anchor_entering,
