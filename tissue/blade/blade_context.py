@@ -1,4 +1,4 @@
-"""What `Tissue` asks of the blade in a step, each in one call of a kernel that takes one struct.
+"""Stages of the blade in a step, each one call of a kernel that takes one struct.
 
 A call from Python takes 0.4 us for each struct that it passes, measured on a busy core. There
 searches, path and report took 83 us of a frame with a call for each function, and 44 us so.
@@ -36,11 +36,11 @@ from tissue.mesh.tetrahedron_grid import TetrahedronGrid, fits, list_appended, l
 from tissue.types import RigidContacts, StepResult
 
 NOT_SEARCHED: Final = 0
-"""Nothing was looked for: the blade is far, or no sample of the edge can have entered."""
+"""There was no search: the blade is far, or no sample of the edge can have entered."""
 SEARCHED: Final = 1
 """The tetrahedra were listed in the grid, and searched."""
 GRID_IS_FULL: Final = 2
-"""The grid must be built anew; then call again."""
+"""The grid must be built again; then call again."""
 NO_ROOM_FOR_FACES: Final = 3
 """The side contacts need more room; then call again."""
 

@@ -60,7 +60,7 @@ def rotation_of_sheet(sheets: BodySheets, k: int) -> Matrix3:
 
 @kernel
 def join_sheet(sheets: BodySheets, k: int, beside: int) -> None:
-    """Note that sample `k` holds, or is placed with, the sheet that sample `beside` holds."""
+    """Put sample `k`, which holds or is placed with it, in the sheet of sample `beside`."""
     sheets.first[k] = sheets.first[beside]
     for i in range(9):
         sheets.rotation[k, i] = sheets.rotation[beside, i]

@@ -41,7 +41,7 @@ class Edge(Vectors):
 
     @property
     def travel(self) -> float:
-        """How far the edge moves [m]: the further of its two ends."""
+        """Distance that the edge moves [m]: the larger one of its two ends."""
         numbers = self._numbers
         tip = math.dist(numbers[9:12], numbers[0:3])
         return max(tip, math.dist(numbers[12:15], numbers[3:6]))
@@ -197,7 +197,7 @@ def edge_or_error(sweep: BladeSweep) -> Edge:
         ValueError: a number is not finite, the blade has no length, it would cut along itself, or
             it turns by more than a right angle.
     """
-    points, ways = [], []
+    points, directions = [], []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
         tip, heel, forward = map(_three_numbers, segment)
         if tip is None or heel is None or forward is None:
@@ -220,12 +220,12 @@ def edge_or_error(sweep: BladeSweep) -> Edge:
                 f"{[*forward]}, from tip to heel is {[x, y, z]}"
             )
         points += [tip, heel, forward]
-        ways.append((x, y, z))
+        directions.append((x, y, z))
     edge = Edge(*points)
-    (x, y, z), (u, v, w) = ways
+    (x, y, z), (u, v, w) = directions
     (a, b, c), (f, g, h) = edge.forward_t0, edge.forward_t1
     if not (x * u + y * v + z * w > 0.0 and a * f + b * g + c * h > 0.0):
-        expect_small_turn(np.array(ways), np.array([edge.forward_t0, edge.forward_t1]))
+        expect_small_turn(np.array(directions), np.array([edge.forward_t0, edge.forward_t1]))
     return edge
 
 
@@ -252,11 +252,11 @@ def expect_small_turn(along: FloatArray, forward: FloatArray) -> None:
     Raises:
         ValueError: it turns further.
     """
-    for what, way in (("edge", along), ("forward", forward)):
-        wrong = np.flatnonzero(~((way[1:] * way[:-1]).sum(axis=1) > 0.0))
+    for what, direction in (("edge", along), ("forward", forward)):
+        wrong = np.flatnonzero(~((direction[1:] * direction[:-1]).sum(axis=1) > 0.0))
         if len(wrong):
             i = int(wrong[0])
             raise ValueError(
                 f"the blade's {what} turns by a right angle or more in one step, from "
-                f"{way[i].tolist()} to {way[i + 1].tolist()}; turn it in smaller steps"
+                f"{direction[i].tolist()} to {direction[i + 1].tolist()}; turn it in smaller steps"
             )

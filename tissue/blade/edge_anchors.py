@@ -55,7 +55,7 @@ class Anchors(Arrays):
     nodes: IntArray
     """Nodes of the tetrahedron when the anchor was set in it, shape (n, 4)."""
     coarse: CoarseHold
-    """What still holds the anchors of the mesh before it was refined."""
+    """Hold of the anchors in the mesh before it was refined."""
     slipped: BoolArray
     """Whether the anchor has cut since it was set, shape (n,)."""
     at_skin: BoolArray
@@ -258,7 +258,7 @@ def stored_energy(
 
 @kernel
 def begin_account(anchors: Anchors, k: int, stretch: Vec3, pose: BladePose) -> None:
-    """Note how an anchor is stretched [m], from where its work is counted next."""
+    """Store the stretch of an anchor [m], from where its work is counted next."""
     anchors.pulls[k] = dot(stretch, pose.forward) >= 0.0
     store(anchors.stretch, k, stretch)
     store(anchors.impulse, k, Vec3(0.0, 0.0, 0.0))

@@ -186,7 +186,7 @@ def frequency_with_blade(
 def limit_frequency_at_blade(
     blade: BladeState, elastic: Elastic, body: Body, scratch: FloatArray
 ) -> float:
-    """Give mass to nodes that body and blade together make faster than the limit.
+    """Add mass to nodes that body and blade together make faster than the limit.
 
     Args:
         blade: Anchors and side contacts.

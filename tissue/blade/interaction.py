@@ -50,7 +50,7 @@ GRID_MARGIN = 0.5
 size."""
 
 CUT_MARGIN = 0.5
-"""How far outside the skin the cut surface begins and ends, per mean node size."""
+"""Distance outside the skin at which the cut begins and ends, per mean node size."""
 
 _BEGIN, _TRACE, _REPORT = SameTypes(begin_blade_step), SameTypes(trace), SameTypes(report_step)
 
@@ -60,7 +60,7 @@ between two places of a turning blade, differ by less; another edge would begin 
 
 
 AddToReport = Callable[[WrenchReport], None]
-"""Adds what acts on the blade beside the tissue."""
+"""Adds the forces on the blade besides those of the tissue."""
 
 
 class BladeInteraction:

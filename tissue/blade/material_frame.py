@@ -24,9 +24,9 @@ MOST_STRAIN = 2.0
 about to be cut is stretched far more; without the bound the path of the cut would leap there."""
 
 BESIDE = 0.5
-"""How far on either side of an anchor the tissue says how the cut turns, per `BladeState.reach`: in
-the next tetrahedron or so. With 1 and 1.5 the force sideways on a blade is as small, and that of a
-cut through eight cells of springs 1 % higher."""
+"""Distance on either side of an anchor within which the tissue shows how the cut turns, per
+`BladeState.reach`: in the next tetrahedron or so. With 1 and 1.5 the force sideways on a blade is
+as small, and that of a cut through eight cells of springs 1 % higher."""
 
 
 @kernel
@@ -45,29 +45,29 @@ def to_material(body: Body, t: int, direction: Vec3) -> Vec3:
 
 
 @kernel
-def way_at_rest(
-    anchors: Anchors, body: Body, k: int, way: Vec3, normal: Vec3, reach: float
+def displacement_at_rest(
+    anchors: Anchors, body: Body, k: int, displacement: Vec3, normal: Vec3, reach: float
 ) -> Vec3:
-    """Map the way of anchor `k` to the body at rest [m].
+    """Map the displacement of anchor `k` to the body at rest [m].
 
     Sideways it is the mean of the tissue on both sides of the cut. Lips that a blade parts are
     sheared, one to each side. An anchor mostly is in one of them, and by that one alone would be
     led away from the cut, ever further: up to 0.6 mm in a block that is symmetric about it, where
     the force on the blade to that side was a third of that of the cut. Where the other lip has
-    parted already, the way goes straight on. Where the body ends beside the cut, as in a thin sheet
-    that folds, the anchor's own tetrahedron decides.
+    parted already, the displacement goes straight on. Where the body ends beside the cut, as in a
+    thin sheet that folds, the anchor's own tetrahedron decides.
 
     Args:
         anchors: The samples, with their sheets.
         body: The tissue.
         k: The anchor.
-        way: The way in the body as it is [m], in the plane of the blade.
+        displacement: The displacement in the body as it is [m], in the plane of the blade.
         normal: Unit normal of that plane.
         reach: `BladeState.reach` [m].
     """
     t, at = anchors.tetrahedron[k], vec3(anchors.rest, k)
     sideways = apply_transposed(rotation_of_sheet(anchors.sheets, k), normal)
-    here = to_material(body, t, way)
+    here = to_material(body, t, displacement)
     right = walk(body, axpy(BESIDE * reach, sideways, at), t)
     left = walk(body, axpy(-BESIDE * reach, sideways, at), t)
     if right.link == OUTER or left.link == OUTER:
@@ -76,7 +76,8 @@ def way_at_rest(
     if right.inside and left.inside:
         drift = 0.5 * dot(
             add(
-                to_material(body, right.tetrahedron, way), to_material(body, left.tetrahedron, way)
+                to_material(body, right.tetrahedron, displacement),
+                to_material(body, left.tetrahedron, displacement),
             ),
             sideways,
         )

@@ -13,7 +13,7 @@ from tissue.blade.edge_anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
 from tissue.blade.material_frame import find_sheets, rest_offset
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
-from tissue.cutting.blade_path import Path, note_way
+from tissue.cutting.blade_path import Path, average_directions
 from tissue.geometry.rotations import apply_transposed
 from tissue.mesh.body import OUTER, Body, walk
 
@@ -25,14 +25,15 @@ SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""
 
 LONGEST_LINK = 2.0
-"""How much longer than on the blade the cut surface between two samples may be, per
+"""Excess of the cut between two samples over its length on the blade, at most, per
 `BladeState.reach`. Beyond it they hold two sheets: a cut surface between them would cut where no
 blade was."""
 
 LONGEST_JUMP = 4.0
-"""How far from where it was a sample may take hold anew and its path go on, per `BladeState.reach`:
-about an edge of a tetrahedron, which is 3 to 4 node sizes. Further away it holds another sheet,
-where its path begins. An anchor that slips may go further: all that it slips through is cut."""
+"""Distance within which a sample may take hold again and its path continue, per
+`BladeState.reach`: about an edge of a tetrahedron, which is 3 to 4 node sizes. Further away it
+holds another sheet, where its path begins. An anchor that slips may go further: all that it slips
+through is cut."""
 
 STEEPEST = 1.0
 """Displacement of the path sideways per displacement ahead, at most. Steeper steps leave tetrahedra
@@ -76,7 +77,7 @@ def trace_path(
     for k in range(n):
         if path.member[k]:
             _begin_or_go_on(blade, body, k, margin, path)
-    note_way(path, blade.reach)
+    average_directions(path, blade.reach)
     for k in range(n):
         path.known[k] = path.member[k]
         if anchors.sheets.first[k] == k and anchors.sheets.has_left[k]:
@@ -87,7 +88,7 @@ def trace_path(
 
 @kernel
 def _note_progress(anchors: Anchors) -> None:
-    """Note of each sheet whether an anchor in it has cut, whether one pulls, and if all left."""
+    """Find of each sheet whether an anchor in it has cut, whether one pulls, and if all left."""
     sheets = anchors.sheets
     for k in range(len(anchors.state)):
         sheet = sheets.first[k]
@@ -103,7 +104,7 @@ def _note_progress(anchors: Anchors) -> None:
 
 @kernel
 def _note_passage(anchors: Anchors, path: Path) -> None:
-    """Note whether an end of the edge holds tissue, and whether the edge leaves all of it ahead."""
+    """Store whether an end of the edge holds tissue, and whether the edge leaves all ahead."""
     state = anchors.state
     if state[0] != FREE or state[len(state) - 1] != FREE:
         path.has_end_in = 1
@@ -179,7 +180,7 @@ def forget_path(path: Path) -> None:
     """Forget where the edge has been: the next path begins at the next contact."""
     path.has_left = path.has_end_in = path.is_through = 0
     for end in range(2):
-        store(path.way, end, Vec3(0.0, 0.0, 0.0))
+        store(path.direction, end, Vec3(0.0, 0.0, 0.0))
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False

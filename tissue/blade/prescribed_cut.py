@@ -8,7 +8,7 @@ from tissue.blade.interaction import MOST_SAMPLES, SAMPLES_PER_NODE_SIZE
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
-from tissue.cutting.blade_path import Path, note_way, path_travel, resampled
+from tissue.cutting.blade_path import Path, average_directions, path_travel, resampled
 from tissue.cutting.incision import CutHooks, Incision
 from tissue.mesh.body import Body, walk
 from tissue.mesh.point_location import tetrahedron_at, tetrahedron_in_box
@@ -66,24 +66,24 @@ def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatAr
             f"edges have shape {rows.shape}; they are two or more places of two or more points: "
             "(n_places, n_points, 3)"
         )
-    ways = np.array(forward, dtype=np.float64)
-    if ways.shape not in ((3,), (len(rows), 3)):
-        raise ValueError(f"forward has shape {ways.shape}; it is (3,) or ({len(rows)}, 3)")
-    if not (np.isfinite(rows).all() and np.isfinite(ways).all()):
+    directions = np.array(forward, dtype=np.float64)
+    if directions.shape not in ((3,), (len(rows), 3)):
+        raise ValueError(f"forward has shape {directions.shape}; it is (3,) or ({len(rows)}, 3)")
+    if not (np.isfinite(rows).all() and np.isfinite(directions).all()):
         raise ValueError("edges and forward hold a number that is not finite")
-    ways = np.broadcast_to(ways, (len(rows), 3)).copy()
+    directions = np.broadcast_to(directions, (len(rows), 3)).copy()
     along = rows[:, -1] - rows[:, 0]
-    across = np.linalg.norm(np.cross(along, ways), axis=1)
-    limit = LEAST_SINE * np.linalg.norm(along, axis=1) * np.linalg.norm(ways, axis=1)
+    across = np.linalg.norm(np.cross(along, directions), axis=1)
+    limit = LEAST_SINE * np.linalg.norm(along, axis=1) * np.linalg.norm(directions, axis=1)
     wrong = np.flatnonzero(~(across > limit))
     if len(wrong):
         i = int(wrong[0])
         raise ValueError(
             f"the edge in place {i} has no length or cuts along itself: forward is "
-            f"{ways[i].tolist()}, from tip to heel is {along[i].tolist()}"
+            f"{directions[i].tolist()}, from tip to heel is {along[i].tolist()}"
         )
-    expect_small_turn(along, ways)
-    return rows, ways / np.linalg.norm(ways, axis=1)[:, None]
+    expect_small_turn(along, directions)
+    return rows, directions / np.linalg.norm(directions, axis=1)[:, None]
 
 
 @kernel
@@ -131,7 +131,7 @@ def prescribe_path(
         store(path.forward, k, forward)
         if dot(sub(p, start), forward) > 0.0:
             store(path.t1, k, p)
-    note_way(path, node_size)
+    average_directions(path, node_size)
     for k in range(n):
         path.seed[k] = _find_seed(path, body, grid, k)
 

@@ -31,7 +31,7 @@ from tissue.blade.edge_anchors import (
     stored_energy,
     surplus_stretch,
 )
-from tissue.blade.material_frame import MOST_STRAIN, way_at_rest
+from tissue.blade.material_frame import MOST_STRAIN, displacement_at_rest
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
@@ -294,7 +294,7 @@ def _slip_anchor(
         totals.work_of_cutting += spent
         totals.released += before - spent
         return
-    # Where the tissue is very distorted an anchor slips less far than asked.
+    # Where the tissue is very distorted an anchor slips less than was planned.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
     left = stored_energy(anchors, k, sub(stretch, slipped), pose, law)
     if left > MOST_STORED * before:
@@ -310,8 +310,8 @@ def _slip_anchor(
     totals.work_of_breaking += before - left - cost
     if anchors.coarse.share[k] > 0.0:
         fade_coarse_hold(anchors.coarse, k)
-    way = sub(vec3(anchors.rest, k), rest)
-    update_rest_share(anchors, k, way, slipped, pose, blade.reach)
+    displacement = sub(vec3(anchors.rest, k), rest)
+    update_rest_share(anchors, k, displacement, slipped, pose, blade.reach)
     at = anchor_position(anchors, body, body.positions, k)
     stretch = sub(add(a, stretch), at)
     totals.released += left
@@ -327,8 +327,8 @@ def _move_anchor(
     anchors = blade.anchors
     anchors.slipped[k] = True
     t = anchors.tetrahedron[k]
-    way = way_at_rest(anchors, body, k, step, pose.normal, blade.reach)
-    p = add(vec3(anchors.rest, k), way)
+    displacement = displacement_at_rest(anchors, body, k, step, pose.normal, blade.reach)
+    p = add(vec3(anchors.rest, k), displacement)
     weights = barycentric_in(p, body.rest, body.tetrahedra, t)
     if smallest_weight(weights) >= -INSIDE_TOLERANCE:  # most often it stays in its tetrahedron
         _hold(anchors, body, k, t, weights)
@@ -344,7 +344,7 @@ def _move_anchor(
 
 @kernel
 def update_rest_share(
-    anchors: Anchors, k: int, way: Vec3, slipped: Vec3, pose: BladePose, reach: float
+    anchors: Anchors, k: int, displacement: Vec3, slipped: Vec3, pose: BladePose, reach: float
 ) -> None:
     """Move the share of area at rest towards what it was where anchor `k` slipped.
 
@@ -354,7 +354,7 @@ def update_rest_share(
     Args:
         anchors: The share is written.
         k: The anchor.
-        way: How far it slipped at rest [m].
+        displacement: Slip at rest [m].
         slipped: How far it slipped in the body as it is [m].
         pose: Pose of the blade.
         reach: `BladeState.reach` [m].
@@ -368,7 +368,7 @@ def update_rest_share(
         return
     spacing = norm(sub(sample_point(pose, high, n), sample_point(pose, low, n)))
     beside = sub(vec3(anchors.rest, high), vec3(anchors.rest, low))
-    area = scale(1.0 / (swept * spacing), cross(way, beside))
+    area = scale(1.0 / (swept * spacing), cross(displacement, beside))
     size = norm(area)
     if size == 0.0:
         return

@@ -2,7 +2,7 @@
 
 These sides push and do not cut. They are as thin as the blade, and meet the skin along a line. Each
 is sampled at points b_k, each for a length l_k of it. A sample that has come through the skin from
-outside presses on the point a_k of the skin that is in its way: a spring of stiffness K pushes a_k
+outside presses on the point a_k of the skin ahead of it: a spring of stiffness K pushes a_k
 along the outward direction d of that side,
 
     U = 1/2 K (d . (b - a))^2      N = K d . (b - a)
@@ -60,7 +60,7 @@ elements are large. Higher: shorter steps."""
 
 
 class StripLaw(Arrays):
-    """How far a blunt side sinks into the tissue between it and the nodes around it."""
+    """Depth to which a blunt side sinks into the tissue between it and the nodes around it."""
 
     unit: float
     """Load per length and depth at which the logarithm is 1 [Pa]."""
@@ -81,7 +81,7 @@ class SpineContacts(Arrays):
     friction: float
     """Coulomb's coefficient."""
     law: StripLaw
-    """How far the sides sink into the tissue that the mesh does not resolve."""
+    """Depth to which the sides sink into the tissue that the mesh does not resolve."""
     state: IntArray
     """IDLE, AWAY, PRESSING or PIERCING, shape (n,)."""
     side: IntArray
@@ -122,12 +122,12 @@ class SpineSide(NamedTuple):
 
 
 class Press(NamedTuple):
-    """How a sample presses on the point that is in its way."""
+    """Pressure of a sample on the point ahead of it."""
 
     depth: float
-    """How far the point is behind the sample [m], up to where it pierces; negative: no contact."""
+    """Depth of the point behind the sample [m], up to where it pierces; negative: no contact."""
     surplus: float
-    """How much farther it is [m]."""
+    """Depth beyond that [m]."""
     beside: float
     """Stretch of friction along the side, within its limit [m]."""
     across: float

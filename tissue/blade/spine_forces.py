@@ -72,7 +72,7 @@ def apply_spine_forces(
 
 @kernel
 def slip_spine(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
-    """Let samples slide, pierce and come free after a step; count the work.
+    """Slide samples, pierce with them and release them after a step; count the work.
 
     Args:
         blade: The samples and totals are written.
@@ -111,7 +111,7 @@ def slip_spine(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -
 
 @kernel
 def _follow(blade: BladeState, body: Body, visits: Visits, k: int, side: SpineSide) -> None:
-    """Let the point that piercing sample `k` holds follow it sideways: what it parted is open."""
+    """Move the point that piercing sample `k` holds sideways with it: tissue behind it is open."""
     spine = blade.spine
     stretch = sub(side.at, touched_point(spine, body, body.positions, k))
     sideways = axpy(-dot(stretch, side.outward), side.outward, stretch)

@@ -1,4 +1,4 @@
-"""The search for the skin that is in the way of the blade's blunt sides, in each part of a step.
+"""The search for the skin ahead of the blade's blunt sides, in each part of a step.
 
 A sample that was away from the tissue and is now within it has come through the skin that lies
 straight behind it, seen along the side's outward direction. While it presses, that point is looked
@@ -40,11 +40,11 @@ from tissue.mesh.tetrahedron_grid import TetrahedronGrid
 
 LEAST_FACING, LEAST_FACING_OF_LIP = 0.3, 0.9
 """Cosine of the angle between a face's normal and the inward direction of a blunt side, from which
-skin, or a face that was cut, is in the way of the side. The lips of a cut that bends are tilted
+skin, or a face that was cut, lies ahead of the side. The lips of a cut that bends are tilted
 against a blade in it: with 0.3 they held back one that was withdrawn."""
 
 DEEPEST_ENTRY = 0.5
-"""How deep below the skin a sample can be that has just come through it, per `BladeState.reach`.
+"""Depth below the skin of a sample that has just come through it, at most, per `BladeState.reach`.
 What is deeper has come in otherwise, through the mouth of a cut."""
 
 ON_FACE = 1e-9
@@ -120,7 +120,7 @@ def _leads(motion: BladeMotion, side: SpineSide) -> bool:
 def _slide(
     blade: BladeState, body: Body, pose: BladePose, side: SpineSide, k: int, skin: Skin
 ) -> None:
-    """Let sample `k` press on the skin where it is now; release it where there is none.
+    """Press sample `k` on the skin where it is now; release it where there is none.
 
     Args:
         blade: The sample is written.
@@ -152,7 +152,7 @@ def _slide(
 def _take_point(
     blade: BladeState, body: Body, pose: BladePose, side: SpineSide, k: int, skin: Skin
 ) -> None:
-    """Let sample `k` touch a point of the skin from now on; count the energy that it begins with.
+    """Begin the contact of sample `k` with a point of the skin; count its first energy.
 
     Args:
         blade: The sample is written.
@@ -184,7 +184,7 @@ def _set_point(spine: SpineContacts, body: Body, k: int, t: int, w: Weights) -> 
 def _list_faces_in_plane(sides: FaceContacts, body: Body, pose: BladePose) -> int:
     """Write the open faces around that the blade's plane meets to `sides.found`; return how many.
 
-    All samples are in that plane, and look for skin within it.
+    All samples are in that plane, and find skin within it.
     """
     n = 0
     plane = dot(pose.tip, pose.normal)
@@ -273,7 +273,7 @@ def release_spine(blade: BladeState) -> None:
 
 @kernel
 def move_point(blade: BladeState, body: Body, visits: Visits, k: int, p: Vec3) -> bool:
-    """Let a sample touch a point of the body at rest; return whether the point is inside.
+    """Move a sample to a point of the body at rest; return whether the point is inside.
 
     Args:
         blade: The sample is written.

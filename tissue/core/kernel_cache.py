@@ -44,7 +44,7 @@ def n_compiled_kernels() -> int:
 
 @functools.cache
 def _machine() -> str:
-    """Return a digest of what Numba looks at: its version, and the processor that it compiles for.
+    """Return a digest of the version of Numba and the processor that it compiles for.
 
     In a folder that is found by it all files fit. One image can hold those of several processors.
     """
@@ -140,7 +140,7 @@ class _Results(caching.CacheImpl):
 class _Files(caching.IndexDataCacheFile):
     """One file for each signature, named after it.
 
-    Numba keeps an index beside numbered files; two processes that write at once mix them up.
+    Numba keeps an index next to numbered files; two processes that write at once mix them up.
     """
 
     def save(self, key: Any, data: Any) -> None:

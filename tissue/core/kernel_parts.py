@@ -254,7 +254,7 @@ class _ProgramCompiler(compiler.CompilerBase):
 
 
 _PARTS: dict[Callable[..., Any], Any] = {}
-"""What compiles the part of each kernel."""
+"""Compiler of the part of each kernel."""
 
 
 def _part_of(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -274,7 +274,7 @@ def in_parts(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     program._cache = KernelCache(function, _Program)
 
     def call_template(arguments: Any, keywords: Any) -> Any:
-        """Let calls with constants share the code of calls with variables.
+        """Make calls with constants share the code of calls with variables.
 
         Numba compiles a function again for each constant that another kernel passes to it: a third
         of the engine's compile time, for code that is inlined anyway.

@@ -12,7 +12,7 @@ from tissue.core.memory_blocks import PackedMemory, memory_of, unpacked
 from tissue.core.structs import Arrays, Vectors
 
 PACKED = "packed_"
-"""What the names of the arrays of `PackedMemory` begin with."""
+"""Prefix of the names of the arrays of `PackedMemory`."""
 
 TAILS, LENGTHS = "tails", "lengths"
 """Names of the bytes behind whole words, and of the lengths of all spans in words."""
@@ -159,7 +159,7 @@ def put_to(
     Args:
         root: The root of the tree.
         tree: See `written`.
-        arrays: The arrays beside it.
+        arrays: The arrays of that tree.
         rules: Those by which it was written.
 
     Raises:

@@ -37,7 +37,7 @@ use it still. New memory costs three times as much as the copy: the system clear
 
 
 class RowsInUse(NamedTuple):
-    """How much of an array of a struct is in use: things that are counted, the first ones first."""
+    """Part of an array of a struct that is in use: counted things, the first ones first."""
 
     struct: Arrays
     field: str
@@ -66,7 +66,7 @@ class StructPart(NamedTuple):
     """An array of a struct that is state."""
 
     name: str
-    """Its field."""
+    """Name of the field."""
     array: np.ndarray
     """The array."""
     address: int
@@ -183,7 +183,7 @@ cast(Any, lower_builtin)(words_at, types.Integer, types.Integer)(_lower_words)
 
 
 class PackedMemory(NamedTuple):
-    """What the spans of a table held at one time."""
+    """Contents of the spans of a table at one time."""
 
     in_use: IntArray
     """Words in use of each span, shape (n_spans,)."""
@@ -192,7 +192,7 @@ class PackedMemory(NamedTuple):
     is_filled: BoolArray
     """Whether all words of a block in use are the same, shape (n_blocks,)."""
     value: IntArray
-    """That word, shape (n_blocks,)."""
+    """The one word of each block, shape (n_blocks,)."""
     words: IntArray
     """The words of all other blocks, one after the other."""
 
@@ -251,7 +251,7 @@ def pack_memory(
 ) -> int:
     """Find the blocks in use that hold one value, and that; write the words of all others.
 
-    In one pass: to look at each block before any is copied takes as long as to copy them.
+    In one pass: a test of each block before any is copied takes as long as the copy.
 
     Args:
         spans: See `ADDRESS`, shape (n_spans, 7).

@@ -92,7 +92,7 @@ _Function = Callable[..., Any]
 def intrinsic(
     function: _Function, *kinds: Any, result: types.Type | _Function = LANES
 ) -> Callable[[_Function], _Function]:
-    """Give `function`, on arguments of these kinds, the code that the decorated one builds.
+    """Compile `function`, on arguments of these kinds, to the code that the decorated one builds.
 
     It is called with the builder and the values of the arguments. `result` is the type of what it
     returns, or a function that finds it from the types of the arguments.

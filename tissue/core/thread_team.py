@@ -35,7 +35,7 @@ LOOP_CHUNKS = 256
 Less than `_ONE_FIRST`."""
 
 SPINS_BEFORE_YIELD = 400
-"""Times that the first thread looks, some 20 us, before it lets others run on its core. More: where
+"""Tests by the first thread, some 20 us, before it lets others run on its core. More: where
 there is one core alone, it waits for a thread that cannot run; fewer: it may lose its core."""
 
 _OPEN, _DONE, _N_SHARED = 0, 16, 32
@@ -77,7 +77,7 @@ def new_team() -> Team:
 
 @kernel
 def open_loop(team: Team, loop: int, seconds: float, n: int, chunk_size: int) -> int:
-    """Let threads claim the chunks of a loop; return how many there are.
+    """Open a loop, whose chunks threads claim; return how many there are.
 
     Args:
         team: Written; the loop before has ended.
@@ -131,7 +131,7 @@ def items_of(team: Team, chunk: int) -> tuple[int, int]:
 
 @kernel
 def end_chunk(team: Team) -> None:
-    """Say that a chunk is done that was claimed by another than the first thread."""
+    """Count a chunk as done that was claimed by another than the first thread."""
     add_shared(team.numbers, _DONE, 1)
 
 
@@ -194,7 +194,7 @@ def _replace(builder: Any, numbers: Operand, i: Any, expected: Any, value: Any) 
 
 
 def pause() -> None:
-    """Let the core rest for some tens of nanoseconds, in a loop that waits."""
+    """Pause the core for some tens of nanoseconds, in a loop that waits."""
 
 
 @intrinsic(pause, result=types.void)
@@ -210,7 +210,7 @@ def _pause(builder: Any) -> None:
 
 
 def yield_core() -> None:
-    """Let the operating system run another thread on this core; without POSIX, do nothing."""
+    """Yield this core to another thread; without POSIX, do nothing."""
 
 
 @intrinsic(yield_core, result=types.void)

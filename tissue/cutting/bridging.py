@@ -3,7 +3,7 @@
 Every edge that the blade crosses gets a node on the cut surface. An edge between the two sides can
 only remain where the cut surface turns within an element, so that a node was on one side of it at
 first and on the other later. Such edges are found when a tetrahedron leaves the list of active
-ones, and cut. An edge of the mesh ahead of the cut surface, or beyond the way of its ends, is no
+ones, and cut. An edge of the mesh ahead of the cut surface, or beyond the path of its ends, is no
 bridge.
 """
 

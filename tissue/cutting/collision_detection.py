@@ -127,7 +127,7 @@ def _visit_star(cut: Cut, node: int, epoch: int) -> None:
 
 @kernel
 def _note_segments(cut: Cut, t: int, n: int) -> bool:
-    """Note which segments' boxes overlap that of tetrahedron `t`; return whether any does."""
+    """List the segments whose boxes overlap that of tetrahedron `t`; return whether any does."""
     body, path, segments = cut.body, cut.path, cut.scratch.segments
     box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)
     last = len(path.linked) - 1
@@ -227,7 +227,7 @@ def _add_tested(tested: HashTable, mask: int, a: int, b: int) -> bool:
 
 @kernel
 def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
-    """Note where one of segments `first` to `last`, swept, crosses edge ab."""
+    """Store where one of segments `first` to `last`, swept, crosses edge ab."""
     body, path, scratch = cut.body, cut.path, cut.scratch
     box = segment_box(body.lattice_rest, a, b)
     near = segments_near(path, box, first, last + 1)

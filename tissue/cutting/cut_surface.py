@@ -113,7 +113,7 @@ def side_of(surface: CutSurface, node: int) -> int:
 
 @kernel
 def note_side(surface: CutSurface, node: int, side: int, again: bool) -> None:
-    """Note the side that `node` was found on; with `again` also where one is noted already."""
+    """Store the side that `node` was found on; with `again` also where one is stored already."""
     touch(surface, node)
     if again or surface.side[node] == 0:
         surface.side[node] = side

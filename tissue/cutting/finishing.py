@@ -19,7 +19,7 @@ from tissue.mesh.star import star
 
 MOST_FINISHED = 0.15
 """Area of the bridges that are finished, as a share of the cut surface, at most. Of a stroke that
-ends where a sixth of the way is left, the bridge stays."""
+ends where a sixth of the stroke is left, the bridge stays."""
 
 MOST_PASSED = 0.25
 """The same, of an edge that has left all tissue ahead and of which neither end was ever in it. It
@@ -27,7 +27,7 @@ has passed through all tissue there was: no bridge is one that it left. Where a 
 and breaks away from the edge at once, what no sample saw was up to 18 %."""
 
 MOST_TRIES = 16
-"""Minimum cuts that are looked for, where all but the last would part a fragment."""
+"""Minimum cuts that are tried, where all but the last would part a fragment."""
 
 
 @kernel
@@ -137,7 +137,7 @@ def _spare_fragments(cut: Cut, graph: FlowGraph) -> bool:
 
 @kernel
 def _note_sides(cut: Cut) -> None:
-    """Note the sides of the tetrahedra at the new faces, and the nodes that no blade passed."""
+    """Store the sides of the tetrahedra at the new faces, and the nodes that no blade passed."""
     body, change = cut.body, cut.change
     for row in range(change.n_faces):
         t = change.faces[row, 0]

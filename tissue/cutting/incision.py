@@ -18,14 +18,14 @@ INCREMENT = 0.25
 steep curves leave tetrahedra that bridge the cut."""
 
 MOST_EDGE_INCREMENTS = 10_000
-"""Increments of a step at most: half a minute of wall time in an organ, for a way of some meters.
+"""Increments of a step at most: half a minute of wall time in an organ, for a path of some metres.
 More is taken for a mistake, which would keep a process for hours."""
 
 RESTING_SPEED = 0.2
 """Mean node sizes per second below which the edge counts as at rest."""
 
 RESTING_TIME = 0.02
-"""How long it is so before the cut opens up to the edge [s]. A trembling hand stands still for an
+"""Time at rest before the cut opens up to the edge [s]. A trembling hand stands still for an
 instant at each turn; to lay a crack front there each time would shred the mesh."""
 
 _SCHEMES = ("stellar", "paper")
@@ -50,7 +50,7 @@ class CutHooks(NamedTuple):
     """Calls of the owner of the mesh while it is cut.
 
     They are passed to each call and not kept: the owner holds the incision, and a cycle of the two
-    would keep the arrays of a body in memory until Python looks for cycles.
+    would keep the arrays of a body in memory until Python searches for cycles.
     """
 
     before_cut: Callable[[], None]
@@ -71,7 +71,7 @@ class Scheme(Protocol):
     """
 
     change: Change
-    """What the last pass changed, and the area cut since the body was made."""
+    """Changes of the last pass, and the area cut since the body was made."""
 
     @property
     def n_active(self) -> int:
@@ -151,7 +151,7 @@ class Incision:
     def n_increments(self, travel: float) -> int:
         """Return in how many increments the edge moves that far [m], little in each.
 
-        It is 1 for a way that is not finite: a blade that goes it is refused anyway.
+        It is 1 for a path that is not finite: a blade on it is refused anyway.
 
         Raises:
             ValueError: there are more than `MOST_EDGE_INCREMENTS`.
@@ -195,7 +195,7 @@ class Incision:
         self._cut_in_passes(self.scheme.cut, hooks)
 
     def open_to_edge(self, hooks: CutHooks) -> None:
-        """Cut up to the edge itself, which rests or leaves the way that it came."""
+        """Cut up to the edge itself, which rests or leaves the path that it came by."""
         self._detect(*hooks.mesh())
         self._cut_in_passes(self.scheme.cut_to_edge, hooks)
         self._is_open = True

@@ -309,7 +309,7 @@ def _detach_fans(cut: Cut, node: int) -> None:
 
 @kernel
 def _detach(cut: Cut, node: int, t: int) -> None:
-    """Give the part of the star of `node` that holds `t` a copy of `node`, if it is apart."""
+    """Double `node` for the part of its star that holds `t`, if that is apart."""
     body, scratch, change, visits = cut.body, cut.scratch, cut.change, cut.visits
     star(body, visits, node, body.node_tetrahedron[node], scratch.around)
     if visits.tetrahedra[t] == visits.epoch:

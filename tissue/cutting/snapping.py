@@ -98,7 +98,7 @@ def _comes_first(cut: Cut, i: int, j: int) -> bool:
 
 @kernel
 def insert_crossings(cut: Cut) -> None:
-    """Give every crossed edge a node on the cut surface, and each of its ends a side."""
+    """Put on every crossed edge a node on the cut surface, and each of its ends a side."""
     sort_crossings(cut)
     scratch = cut.scratch
     for i in range(scratch.n_crossings):
@@ -116,7 +116,7 @@ def insert_crossings(cut: Cut) -> None:
 
 @kernel
 def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
-    """Give edge ab a node on the cut surface, and its ends a side.
+    """Put a node of edge ab on the cut surface, and set the sides of its ends.
 
     Args:
         cut: Read and written.

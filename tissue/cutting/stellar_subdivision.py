@@ -169,7 +169,7 @@ def _new_node(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
 
 @kernel
 def _note_spin(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3, node: int) -> None:
-    """Note the rotation of the ends about the new node: it has a share of their masses now."""
+    """Store the rotation of the ends about the new node: it has a share of their masses now."""
     body, volume = cut.body, 0.0
     for i in range(n):
         volume += tetrahedron_volume(body.rest, body.tetrahedra, cut.scratch.parents[i])

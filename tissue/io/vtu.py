@@ -50,7 +50,7 @@ LZMA_MEMORY = 2**28
 
 
 class Encoding(NamedTuple):
-    """How a file writes numbers."""
+    """Form in which a file writes numbers."""
 
     byte_order: str
     """Order of bytes, "<" or ">"."""

@@ -1,4 +1,4 @@
-"""The topology container: the body's arrays, and what is looked up in them.
+"""The topology container: the body's arrays, and searches in them.
 
 In the order in which they are best read:
 

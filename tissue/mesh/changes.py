@@ -15,10 +15,10 @@ CHANGES = 1 << 15
 meshes of ordinary stars. Where it does not suffice there is more room, and the step is repeated."""
 
 LISTS: Final = 1
-"""What lacks room: the lists of a pass."""
+"""Lack of room in the lists of a pass."""
 
 NODES: Final = 2
-"""What lacks room: the arrays of the body, for nodes that are doubled."""
+"""Lack of room in the arrays of the body, for nodes that are doubled."""
 
 PASS_NODES = 256
 """Nodes that one pass of a cut step puts on the cut surface at most; a step that needs more takes
@@ -32,7 +32,7 @@ ROOM_FOR_TETRAHEDRA = 1 << 12
 
 
 class Change(Arrays):
-    """What one pass of a cut step changed."""
+    """Changes of one pass of a cut step."""
 
     flagged: IntArray
     """Nodes that came to lie on the cut surface, shape (room,)."""
@@ -74,7 +74,7 @@ class ChangedMesh(NamedTuple):
     visits: Visits
     """Scratch for searches."""
     change: Change
-    """What the pass changed."""
+    """Changes of the pass."""
     nodes: IntArray
     """Nodes of the tetrahedra that changed, each once, shape (n,)."""
 
@@ -137,7 +137,7 @@ def clear_changes(change: Change) -> None:
 
 @kernel
 def note_dirty(change: Change, t: int) -> None:
-    """Note that tetrahedron `t` was changed."""
+    """List tetrahedron `t` as changed."""
     if change.n_dirty == len(change.dirty):
         change.lacks_room = LISTS
         return
@@ -147,7 +147,7 @@ def note_dirty(change: Change, t: int) -> None:
 
 @kernel
 def note_child(change: Change, child: int, parent: int) -> None:
-    """Note that tetrahedron `child`, which was appended, is a part of `parent`."""
+    """List tetrahedron `child`, which was appended, as a part of `parent`."""
     if change.n_children == len(change.children):
         change.lacks_room = LISTS
         return

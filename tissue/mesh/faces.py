@@ -24,7 +24,7 @@ class SortedFaces(NamedTuple):
     starts: IntArray
     """Where in `halves` each distinct face begins, shape (n_faces,)."""
     counts: IntArray
-    """How many tetrahedra have the face, shape (n_faces,)."""
+    """Number of tetrahedra that have the face, shape (n_faces,)."""
 
 
 def sorted_faces(tetrahedra: IntArray) -> SortedFaces:

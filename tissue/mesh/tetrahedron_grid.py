@@ -43,7 +43,7 @@ LOGGED = 256
 """Tetrahedra that `TetrahedronGrid.log` has room for."""
 
 _INSIDE = 1e-6
-"""How far within a cell its limits for a node are, per spacing: more than any rounding."""
+"""Distance of the limits for a node within a cell, per spacing: more than any rounding."""
 
 
 class TetrahedronGrid(Arrays):

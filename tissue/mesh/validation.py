@@ -51,7 +51,7 @@ class CheckedMesh(NamedTuple):
     origin: IntArray
     """Node of the given mesh that each node was, shape (n_nodes,)."""
     warnings: tuple[str, ...]
-    """What was repaired, and what is doubtful."""
+    """Repairs, and doubtful things."""
 
 
 def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
@@ -304,7 +304,7 @@ def crowding_of(tetrahedra: IntArray) -> str | None:
         return None
     return (
         f"node {counts.argmax()} has {counts.max()} tetrahedra around it; there may be "
-        f"{LARGEST_STAR}. Mesh the body anew: ordinary meshes have 60 at most"
+        f"{LARGEST_STAR}. Mesh the body again: ordinary meshes have 60 at most"
     )
 
 

@@ -73,7 +73,7 @@ def test_a_multiple_of_a_vector_is_added_to_a_row_as_scalars_are():
 
 
 VALUES = np.random.default_rng(0).uniform(0.5, 2.0, 48)
-OF = np.array([3, 1, 24, 1, 5, 9, 22, 6, 5, 3], dtype=np.int32)
+PLACES = np.array([3, 1, 24, 1, 5, 9, 22, 6, 5, 3], dtype=np.int32)
 
 
 def gather_values(values, of, out):
@@ -82,10 +82,10 @@ def gather_values(values, of, out):
 
 def test_values_are_gathered_and_summed_up():
     out, expected = np.zeros((2, 1))
-    kernel(gather_values)(VALUES, OF, out)
-    gather_values(VALUES, OF, expected)
+    kernel(gather_values)(VALUES, PLACES, out)
+    gather_values(VALUES, PLACES, expected)
     np.testing.assert_array_equal(out, expected)
-    assert out[0] == pytest.approx(VALUES[OF[2:10]].sum(), rel=1e-15)
+    assert out[0] == pytest.approx(VALUES[PLACES[2:10]].sum(), rel=1e-15)
 
 
 def compare_bits(values, out):
@@ -119,8 +119,8 @@ def picked(values, of, out):
 
 
 def test_an_index_that_is_not_negative_is_itself():
-    out, expected = np.zeros((2, len(OF)))
-    kernel(picked)(VALUES, OF, out)
-    picked(VALUES, OF, expected)
+    out, expected = np.zeros((2, len(PLACES)))
+    kernel(picked)(VALUES, PLACES, out)
+    picked(VALUES, PLACES, expected)
     np.testing.assert_array_equal(out, expected)
-    np.testing.assert_array_equal(out, VALUES[OF])
+    np.testing.assert_array_equal(out, VALUES[PLACES])

@@ -29,7 +29,7 @@ class Records(Arrays):
     tetrahedra: IntArray
     """Nodes A, B, C, D of each tetrahedron, shape (n_tets, 4)."""
     links: IntArray
-    """What is behind each face, as `Body.links` before the first cut; shape (n_tets, 4)."""
+    """Half-faces behind each face, as `Body.links` before the first cut; shape (n_tets, 4)."""
     first_child: IntArray
     """First appended child, or WHOLE_STILL; child 0 replaces its parent; shape (n_tets,)."""
     edges_of: IntArray

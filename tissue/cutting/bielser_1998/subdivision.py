@@ -145,7 +145,7 @@ def _velocity_within(s: Split, t: int, local: int) -> Vec3:
 
 @kernel
 def _arm(s: Split, t: int, node: int) -> Vec3:
-    """Return the way from the first corner of the initial tetrahedron `t` to a node [m]."""
+    """Return the vector from the first corner of the initial tetrahedron `t` to a node [m]."""
     origin = vec3(s.body.positions, s.records.tetrahedra[t, 0])
     return sub(vec3(s.body.positions, node), origin)
 
