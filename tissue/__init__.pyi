@@ -52,8 +52,8 @@ from .mesh.faces import boundary_faces as boundary_faces
 from .mesh.mesh_arrays import MeshError as MeshError
 from .mesh.pieces import pieces_of as pieces_of
 from .shapes.block import block as block
+from .shapes.block import lattice_block as lattice_block
 from .shapes.cylinder import cylinder as cylinder
-from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import TissueState as TissueState

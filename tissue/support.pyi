@@ -1,14 +1,14 @@
-from .core.cache_directory import cache_directory as cache_directory
-from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
 from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
+from .core.kernel_cache import cache_directory as cache_directory
+from .core.kernel_cache import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
-from .geometry.connected_components import components as components
 from .io.whole_file import new_whole_file as new_whole_file
 from .io.whole_file import remove_unfinished as remove_unfinished
 from .io.whole_file import whole_file as whole_file
+from .mesh.pieces import components as components
 from .state.tissue_state import Around as Around
 
 __all__ = [

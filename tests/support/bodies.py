@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from tissue import BoolArray, FloatArray, TetrahedralMesh, block, read_mesh
-from tissue.geometry.connected_components import components
+from tissue.mesh.pieces import components
 from tissue.mesh.validation import checked, quality
 from tissue.shapes.isosurface_stuffing import stuff
 

@@ -5,15 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
-from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
 from tissue.blade.edge import NOWHERE
+from tissue.blade.edge_anchors import Anchors, new_anchors
 from tissue.contact.geoms.geom_contact import no_geoms
 from tissue.contact.response.contacts import new_penalty_forces
 from tissue.core.thread_team import new_team
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
-from tissue.cutting.cut_surface import new_sheet
+from tissue.cutting.cut_surface import new_cut_surface
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.collapse import no_collapse
 from tissue.elasticity.finite_elements import no_solid, room_for_stars
@@ -34,10 +34,9 @@ from tissue.integrators.driver import take_steps
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
 from tissue.laws.energy_density import volume_term
 from tissue.mesh.body import Body, build_body, grown_body
-from tissue.mesh.changes import new_change
-from tissue.mesh.loose_pieces import no_loose_pieces
+from tissue.mesh.changes import SPARE_NODES, new_change
+from tissue.mesh.pieces import no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, no_visits
-from tissue.mesh.workspace import SPARE_NODES
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
 
@@ -48,7 +47,7 @@ def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
     return Cut(
         body=grown_body(build_body(mesh, None, None), n_nodes, n_tetrahedra),
         visits=no_visits(n_nodes, n_tetrahedra),
-        sheet=new_sheet(n_nodes, n_tetrahedra),
+        surface=new_cut_surface(n_nodes, n_tetrahedra),
         path=new_path(n_samples),
         change=new_change(),
         scratch=new_cut_scratch(n_tetrahedra),

@@ -1,27 +1,31 @@
-"""What `Tissue` asks of the blade in a step, each in one call of a kernel that takes one struct.
+"""Stages of the blade in a step, each one call of a kernel that takes one struct.
 
 A call from Python takes 0.4 us for each struct that it passes, measured on a busy core. There
 searches, path and report took 83 us of a frame with a call for each function, and 44 us so.
 """
 
-from typing import Final
+from typing import Any, Final, Self
 
-from tissue.blade.anchors import anchored_length, is_engaged
+import numpy as np
+
 from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_search import release_blunt_sides, update_blunt_sides
 from tissue.blade.edge import Edge, motion_at, pose_at
-from tissue.blade.engagement import (
+from tissue.blade.edge_anchors import anchored_length, is_engaged
+from tissue.blade.edge_search import (
     anchor_beside,
     anchor_entering,
     any_free_in_box,
     free_retracted,
 )
+from tissue.blade.faces_search import blade_box, find_faces, release_faces
 from tissue.blade.forces import clear_blade_forces
 from tissue.blade.path_tracing import trace_path
-from tissue.blade.side_search import blade_box, find_faces, release_faces
-from tissue.blade.wrench import WrenchReport, write_means, write_report
+from tissue.blade.spine_search import release_spine, update_spine
+from tissue.blade.wrench import BladeReport, WrenchReport, write_means, write_report
+from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.lazy_fields import lazy_fields
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import vec3
 from tissue.cutting.blade_path import Path, path_travel
@@ -29,13 +33,14 @@ from tissue.geometry.aabb import box_between, overlap
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import TetrahedronGrid, fits, list_appended, list_moved
+from tissue.types import RigidContacts, StepResult
 
 NOT_SEARCHED: Final = 0
-"""Nothing was looked for: the blade is far, or no sample of the edge can have entered."""
+"""There was no search: the blade is far, or no sample of the edge can have entered."""
 SEARCHED: Final = 1
 """The tetrahedra were listed in the grid, and searched."""
 GRID_IS_FULL: Final = 2
-"""The grid must be built anew; then call again."""
+"""The grid must be built again; then call again."""
 NO_ROOM_FOR_FACES: Final = 3
 """The side contacts need more room; then call again."""
 
@@ -62,9 +67,9 @@ class BladeContext(Arrays):
     """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
     slit_reach: float
     """Distance from a cut face up to which a point is in the slit [m]
-    (`tissue.blade.engagement.is_in_slit`)."""
-    sheet_margin: float
-    """How far outside the skin the sheet of the cut begins and ends [m]."""
+    (`tissue.blade.edge_search.is_in_slit`)."""
+    cut_margin: float
+    """Distance outside the skin at which the cut surface begins and ends [m]."""
 
 
 @kernel
@@ -83,7 +88,7 @@ def _list_tetrahedra(context: BladeContext, nodes: IntArray, n: int) -> bool:
 def release_sides(blade: BladeState) -> None:
     """End all contacts of the side faces, the back and the ends; count their energy as released."""
     release_faces(blade)
-    release_blunt_sides(blade)
+    release_spine(blade)
 
 
 @kernel
@@ -105,7 +110,7 @@ def update_faces(context: BladeContext, edge: Edge, when: float, nodes: IntArray
         return GRID_IS_FULL
     if not find_faces(blade, context.body, context.grid, edge, when):
         return NO_ROOM_FOR_FACES
-    update_blunt_sides(blade, context.body, context.grid, motion_at(edge, when))
+    update_spine(blade, context.body, context.grid, motion_at(edge, when))
     return SEARCHED
 
 
@@ -154,7 +159,7 @@ def trace(context: BladeContext, edge: Edge, when: float) -> float:
     anchors, path = context.blade.anchors, context.path
     if not is_engaged(anchors):
         return NOT_ENGAGED
-    trace_path(context.blade, context.body, edge, when, context.sheet_margin, path)
+    trace_path(context.blade, context.body, edge, when, context.cut_margin, path)
     return path_travel(path)
 
 
@@ -171,3 +176,41 @@ def report_step(context: BladeContext, edge: Edge, dt: float) -> None:
     for corner in range(2):
         for axis in range(3):
             report.bounds[corner, axis] = context.bounds[corner, axis]
+
+
+@lazy_fields(
+    contacts=lambda result: result.all_contacts(),
+    wrench_t1=lambda result: result.report.wrench,
+    force_on_tissue=lambda result: result.report.mean_force_on_tissue,
+)
+class LazyResult(StepResult):
+    """The result of a step, with a copy of what the blade reported."""
+
+    report: BladeReport
+    geoms: GeomContact | None
+
+    @classmethod
+    def of(cls, report: BladeReport, geoms: GeomContact | None, *others: object) -> Self:
+        """Return the result of a step.
+
+        Args:
+            report: That of the blade.
+            geoms: Contact with geoms, where there is any.
+            others: The fields of `StepResult` after bounds.
+        """
+        mean_wrench, stiffness, _, bounds, _, _ = report
+        first = (mean_wrench, None, stiffness, None, None, bounds)
+        result: Self = _new(cls, (*first, *others))
+        result.report, result.geoms = report, geoms
+        return result
+
+    def all_contacts(self) -> RigidContacts:
+        """Return the contacts of the blade, and behind them those of geoms."""
+        of_blade = self.report.contacts
+        if self.geoms is None:
+            return of_blade
+        both = zip(of_blade, self.geoms.contacts(), strict=True)
+        return RigidContacts._make(map(np.concatenate, both))
+
+
+_new: Any = tuple.__new__

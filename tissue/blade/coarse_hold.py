@@ -1,4 +1,4 @@
-"""How an anchor passes from a tetrahedron to the parts that a cut divides it into.
+"""Passage of an anchor from a tetrahedron to the parts that a cut divides it into.
 
 A force at a point moves a fine mesh further than a coarse one. If the nodes that a cut inserts at
 the edge bore the pull of the anchors at once, the tissue there would jump ahead: the force dropped
@@ -57,7 +57,7 @@ def store_weights(weights: FloatArray, k: int, w: Weights) -> None:
 
 @kernel
 def begin_coarse_hold(coarse: CoarseHold, k: int, nodes: IntArray, weights: FloatArray) -> None:
-    """Let the tetrahedron that held anchor `k` until now hold the whole of it.
+    """Begin with the tetrahedron that held anchor `k` until now as its whole hold.
 
     Where an earlier one still holds more than half of the anchor, that one stays.
 

@@ -7,8 +7,13 @@ takes the `Edge` and an instant, computes the pose once, and passes it to the ke
 import math
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Vectors
+from tissue.core.three_vectors import BladeSweep
 from tissue.core.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
 
@@ -36,7 +41,7 @@ class Edge(Vectors):
 
     @property
     def travel(self) -> float:
-        """How far the edge moves [m]: the further of its two ends."""
+        """Distance that the edge moves [m]: the larger one of its two ends."""
         numbers = self._numbers
         tip = math.dist(numbers[9:12], numbers[0:3])
         return max(tip, math.dist(numbers[12:15], numbers[3:6]))
@@ -171,3 +176,87 @@ def blade_coordinates(pose: BladePose, p: Vec3) -> BladeCoordinates:
     """Return point `p` [m] in the axes of the blade."""
     r = sub(p, pose.tip)
     return BladeCoordinates(dot(r, pose.along), -dot(r, pose.forward), dot(r, pose.normal))
+
+
+def edge_of(sweep: BladeSweep) -> Edge:
+    """Return the cutting edge over a step; `begin_blade_step` checks what it is.
+
+    Raises:
+        ValueError: tip, heel or forward are not three numbers each.
+    """
+    try:
+        return Edge.of_numbers(sweep.t0.numbers + sweep.t1.numbers)
+    except (AttributeError, TypeError, ValueError):
+        return edge_or_error(sweep)
+
+
+def edge_or_error(sweep: BladeSweep) -> Edge:
+    """Return the cutting edge over a step, where a blade can move so.
+
+    Raises:
+        ValueError: a number is not finite, the blade has no length, it would cut along itself, or
+            it turns by more than a right angle.
+    """
+    points, directions = [], []
+    for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
+        tip, heel, forward = map(_three_numbers, segment)
+        if tip is None or heel is None or forward is None:
+            rows = [np.asarray(part, dtype=np.float64).tolist() for part in segment]
+            raise ValueError(
+                f"the blade at the {when} of the step is {rows}; tip, heel and forward are three "
+                "finite numbers each"
+            )
+        x, y, z = heel.x - tip.x, heel.y - tip.y, heel.z - tip.z
+        u, v, w = forward
+        length = math.hypot(x, y, z)
+        if not length > 0.0:
+            raise ValueError(
+                f"the blade at the {when} of the step has no length: {[[*tip], [*heel]]}"
+            )
+        across = math.hypot(y * w - z * v, z * u - x * w, x * v - y * u)
+        if not across > LEAST_SINE * length * math.hypot(u, v, w):
+            raise ValueError(
+                f"the blade at the {when} of the step cuts along its own edge: forward is "
+                f"{[*forward]}, from tip to heel is {[x, y, z]}"
+            )
+        points += [tip, heel, forward]
+        directions.append((x, y, z))
+    edge = Edge(*points)
+    (x, y, z), (u, v, w) = directions
+    (a, b, c), (f, g, h) = edge.forward_t0, edge.forward_t1
+    if not (x * u + y * v + z * w > 0.0 and a * f + b * g + c * h > 0.0):
+        expect_small_turn(np.array(directions), np.array([edge.forward_t0, edge.forward_t1]))
+    return edge
+
+
+def _three_numbers(part: npt.ArrayLike) -> Vec3 | None:
+    """Return three finite numbers as plain floats; None where they are not that."""
+    array = np.asarray(part, dtype=np.float64)
+    if array.shape != (3,):
+        return None
+    x, y, z = array.tolist()
+    # A sum is finite only where all are, and is faster to ask.
+    is_finite = math.isfinite(x + y + z) or all(map(math.isfinite, (x, y, z)))
+    return Vec3(x, y, z) if is_finite else None
+
+
+def expect_small_turn(along: FloatArray, forward: FloatArray) -> None:
+    """Check that the blade turns by less than a right angle from each place to the next.
+
+    Between two places it is interpolated; halfway round it would have no direction.
+
+    Args:
+        along: From tip to heel, shape (n_places, 3).
+        forward: Where it faces, shape (n_places, 3).
+
+    Raises:
+        ValueError: it turns further.
+    """
+    for what, direction in (("edge", along), ("forward", forward)):
+        wrong = np.flatnonzero(~((direction[1:] * direction[:-1]).sum(axis=1) > 0.0))
+        if len(wrong):
+            i = int(wrong[0])
+            raise ValueError(
+                f"the blade's {what} turns by a right angle or more in one step, from "
+                f"{direction[i].tolist()} to {direction[i + 1].tolist()}; turn it in smaller steps"
+            )

@@ -1,7 +1,19 @@
 """Forces of the cutting edge on the nodes."""
 
-from tissue.blade.anchors import (
+from tissue.blade.blade_state import (
+    BladeState,
+    add_reaction,
+    add_to_node,
+    running_totals,
+    store_totals,
+)
+from tissue.blade.edge import (
+    BladeMotion,
+    displacement_of,
+)
+from tissue.blade.edge_anchors import (
     ANCHORED,
+    Anchors,
     anchor_position,
     holding_node,
     holding_weight,
@@ -9,9 +21,6 @@ from tissue.blade.anchors import (
     pulling_point,
     surplus_stretch,
 )
-from tissue.blade.blade_state import BladeState
-from tissue.blade.edge import BladeMotion, displacement_of
-from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
@@ -63,3 +72,53 @@ def apply_edge_forces(
         at = sub(b, surplus)
         running = add_reaction(running, at, force, displacement_of(motion, at), share, seconds)
     store_totals(blade.totals, running)
+
+
+@kernel
+def clear_anchor_forces(anchors: Anchors, body: Body, external: FloatArray) -> None:
+    """Set the forces on the nodes that anchors pull on to zero."""
+    before = -1
+    for k in range(len(anchors.state)):
+        t = anchors.tetrahedron[k]
+        if anchors.state[k] != ANCHORED or (t == before and anchors.coarse.share[k] == 0.0):
+            continue
+        before = t
+        for i in range(n_holding_nodes(anchors, k)):
+            node = holding_node(anchors, body, k, i)
+            external[node, 0] = external[node, 1] = external[node, 2] = 0.0
+
+
+@kernel
+def add_anchor_stiffness(anchors: Anchors, body: Body, stiffness: FloatArray) -> None:
+    """Add the anchors' rows to `stiffness` [N/m], shape (capacity, 3), of which x is used.
+
+    Gershgorin's bound: anchor K adds K |w_i| sum |w| to the row of node i.
+    """
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            total = 0.0
+            for i in range(n_holding_nodes(anchors, k)):
+                total += abs(holding_weight(anchors, k, i))
+            for i in range(n_holding_nodes(anchors, k)):
+                node = holding_node(anchors, body, k, i)
+                row = anchors.stiffness[k] * abs(holding_weight(anchors, k, i)) * total
+                stiffness[node, 0] += row
+
+
+@kernel
+def highest_anchor_frequency(
+    anchors: Anchors, body: Body, frequency_squared: FloatArray, stiffness: FloatArray
+) -> float:
+    """Return a bound on w^2 [1/s2] over the nodes that anchors pull on.
+
+    It is that of the body, `frequency_squared`, and of `stiffness` together.
+    """
+    worst = 0.0
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            for i in range(n_holding_nodes(anchors, k)):
+                node = holding_node(anchors, body, k, i)
+                if not body.fixed[node]:
+                    own = frequency_squared[node] + stiffness[node, 0] / body.masses[node]
+                    worst = max(worst, own)
+    return worst

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tissue.blade.anchors import anchor_stiffness, is_engaged, new_anchors
 from tissue.blade.blade_context import (
     GRID_IS_FULL,
     NO_ROOM_FOR_FACES,
@@ -18,13 +17,14 @@ from tissue.blade.blade_context import (
     update_faces,
 )
 from tissue.blade.blade_state import new_blade_state
-from tissue.blade.blunt_contact import new_blunt_contacts
-from tissue.blade.blunt_search import relocate_blunt_sides
 from tissue.blade.edge import NOWHERE, Edge
+from tissue.blade.edge_anchors import anchor_stiffness, is_engaged, new_anchors
+from tissue.blade.faces_contact import grown_face_contacts, with_more_faces
+from tissue.blade.faces_search import forget_cells, forget_changed_faces
 from tissue.blade.forces import begin_blade_step, release_edge
 from tissue.blade.return_mapping import relocate
-from tissue.blade.side_contact import grown_side_contacts, with_more_faces
-from tissue.blade.side_search import forget_cells, forget_changed_faces
+from tissue.blade.spine_contact import new_spine_contacts
+from tissue.blade.spine_search import relocate_spine
 from tissue.blade.toughness import toughness_law_of
 from tissue.blade.wrench import BladeReport, WrenchReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
@@ -34,7 +34,7 @@ from tissue.cutting.blade_path import Path
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.moved_nodes import Moved, forget_moved
+from tissue.mesh.node_motion import Moved, forget_moved
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import build_grid, no_grid
 from tissue.types import RigidContacts
@@ -49,8 +49,8 @@ GRID_MARGIN = 0.5
 """Distance that a node moves before its tetrahedra are listed in the grid again, per mean node
 size."""
 
-SHEET_MARGIN = 0.5
-"""How far outside the skin the sheet begins and ends, per mean node size."""
+CUT_MARGIN = 0.5
+"""Distance outside the skin at which the cut begins and ends, per mean node size."""
 
 _BEGIN, _TRACE, _REPORT = SameTypes(begin_blade_step), SameTypes(trace), SameTypes(report_step)
 
@@ -60,7 +60,7 @@ between two places of a turning blade, differ by less; another edge would begin 
 
 
 AddToReport = Callable[[WrenchReport], None]
-"""Adds what acts on the blade beside the tissue."""
+"""Adds the forces on the blade besides those of the tissue."""
 
 
 class BladeInteraction:
@@ -159,20 +159,20 @@ class BladeInteraction:
         self.state = self.state.replaced(anchors=anchors)
         if self._shape is not None and length > 0.0:
             where = (self._shape, length, self._material, self._node_size)
-            self.state = self.state.replaced(blunt=new_blunt_contacts(*where))
+            self.state = self.state.replaced(spine=new_spine_contacts(*where))
         self._renew_report()
         self._edge_length = length
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many tetrahedra; there are no rows of nodes."""
         del n_nodes
-        self.state = self.state.replaced(sides=grown_side_contacts(self.state.sides, n_tetrahedra))
+        self.state = self.state.replaced(sides=grown_face_contacts(self.state.sides, n_tetrahedra))
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Find the tetrahedra of the anchors again after a pass of a cut."""
         body, visits, change, _ = changed
         relocate(self.state, body, visits, *self.edge_now)
-        relocate_blunt_sides(self.state, body, visits)
+        relocate_spine(self.state, body, visits)
         if self._shape is not None:
             forget_changed_faces(self.state.sides, body, change.dirty, change.n_dirty)
 
@@ -192,7 +192,7 @@ class BladeInteraction:
             bounds: Lowest and highest corner of a box around the tissue [m], shape (2, 3). They,
                 and the distance below, are the same for all steps.
             slit_reach: Distance from a cut face up to which a point is in the slit [m]
-                (`tissue.blade.engagement.is_in_slit`).
+                (`tissue.blade.edge_search.is_in_slit`).
         """
         context = self._context
         if (
@@ -213,7 +213,7 @@ class BladeInteraction:
                 report=self._report,
                 bounds=bounds,
                 slit_reach=slit_reach,
-                sheet_margin=SHEET_MARGIN * self._node_size,
+                cut_margin=CUT_MARGIN * self._node_size,
             )
         return context
 

@@ -1,11 +1,11 @@
 """Vectors of the deformed body, mapped to the body at rest."""
 
-from tissue.blade.anchors import FREE, Anchors
+from tissue.blade.body_sheets import rotation_of_sheet, write_rotation
 from tissue.blade.edge import BladePose, sample_point
-from tissue.blade.walls import rotation_of_wall, write_rotation
+from tissue.blade.edge_anchors import FREE, Anchors
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, sub, vec3
-from tissue.geometry.polar_decomposition import apply_transposed
+from tissue.geometry.rotations import apply_transposed
 from tissue.geometry.tetrahedron import (
     Matrix3,
     apply,
@@ -24,9 +24,9 @@ MOST_STRAIN = 2.0
 about to be cut is stretched far more; without the bound the path of the cut would leap there."""
 
 BESIDE = 0.5
-"""How far on either side of an anchor the tissue says how the cut turns, per `BladeState.reach`: in
-the next tetrahedron or so. With 1 and 1.5 the force sideways on a blade is as small, and that of a
-cut through eight cells of springs 1 % higher."""
+"""Distance on either side of an anchor within which the tissue shows how the cut turns, per
+`BladeState.reach`: in the next tetrahedron or so. With 1 and 1.5 the force sideways on a blade is
+as small, and that of a cut through eight cells of springs 1 % higher."""
 
 
 @kernel
@@ -45,29 +45,29 @@ def to_material(body: Body, t: int, direction: Vec3) -> Vec3:
 
 
 @kernel
-def way_at_rest(
-    anchors: Anchors, body: Body, k: int, way: Vec3, normal: Vec3, reach: float
+def displacement_at_rest(
+    anchors: Anchors, body: Body, k: int, displacement: Vec3, normal: Vec3, reach: float
 ) -> Vec3:
-    """Map the way of anchor `k` to the body at rest [m].
+    """Map the displacement of anchor `k` to the body at rest [m].
 
     Sideways it is the mean of the tissue on both sides of the cut. Lips that a blade parts are
     sheared, one to each side. An anchor mostly is in one of them, and by that one alone would be
     led away from the cut, ever further: up to 0.6 mm in a block that is symmetric about it, where
     the force on the blade to that side was a third of that of the cut. Where the other lip has
-    parted already, the way goes straight on. Where the body ends beside the cut, as in a thin wall
-    that folds, the anchor's own tetrahedron decides.
+    parted already, the displacement goes straight on. Where the body ends beside the cut, as in a
+    thin sheet that folds, the anchor's own tetrahedron decides.
 
     Args:
-        anchors: The samples, with their walls.
+        anchors: The samples, with their sheets.
         body: The tissue.
         k: The anchor.
-        way: The way in the body as it is [m], in the plane of the blade.
+        displacement: The displacement in the body as it is [m], in the plane of the blade.
         normal: Unit normal of that plane.
         reach: `BladeState.reach` [m].
     """
     t, at = anchors.tetrahedron[k], vec3(anchors.rest, k)
-    sideways = apply_transposed(rotation_of_wall(anchors.walls, k), normal)
-    here = to_material(body, t, way)
+    sideways = apply_transposed(rotation_of_sheet(anchors.sheets, k), normal)
+    here = to_material(body, t, displacement)
     right = walk(body, axpy(BESIDE * reach, sideways, at), t)
     left = walk(body, axpy(-BESIDE * reach, sideways, at), t)
     if right.link == OUTER or left.link == OUTER:
@@ -76,7 +76,8 @@ def way_at_rest(
     if right.inside and left.inside:
         drift = 0.5 * dot(
             add(
-                to_material(body, right.tetrahedron, way), to_material(body, left.tetrahedron, way)
+                to_material(body, right.tetrahedron, displacement),
+                to_material(body, left.tetrahedron, displacement),
             ),
             sideways,
         )
@@ -84,38 +85,38 @@ def way_at_rest(
 
 
 @kernel
-def find_walls(anchors: Anchors, body: Body, apart: float) -> None:
-    """Find the walls that the samples hold, and how each is turned.
+def find_sheets(anchors: Anchors, body: Body, apart: float) -> None:
+    """Find the sheets that the samples hold, and how each is turned.
 
-    Samples that follow each other along the edge hold the same wall unless their material points
+    Samples that follow each other along the edge hold the same sheet unless their material points
     are far apart, or there is a long gap between them. A single sample may let go for an instant;
-    that does not part a wall.
+    that does not part a sheet.
 
     Args:
-        anchors: The samples; `walls` is written.
+        anchors: The samples; `sheets` is written.
         body: The tissue.
-        apart: Length of a gap that parts two walls, and by how much more than their samples two
-            points of one wall may be apart at rest [m].
+        apart: Length of a gap that parts two sheets, and by how much more than their samples two
+            points of one sheet may be apart at rest [m].
     """
-    walls = anchors.walls
+    sheets = anchors.sheets
     n = len(anchors.state)
     spacing = 2.0 * anchors.length[0]  # the first sample stands for half
     before = -1
     for k in range(n):
-        walls.first[k] = -1
+        sheets.first[k] = -1
         if anchors.state[k] == FREE:
             continue
-        walls.first[k] = k
+        sheets.first[k] = k
         if before >= 0:
             distance = norm(sub(vec3(anchors.rest, k), vec3(anchors.rest, before)))
             between = spacing * (k - before)
             if between - spacing <= apart and distance <= apart + between:
-                walls.first[k] = walls.first[before]
+                sheets.first[k] = sheets.first[before]
             else:
-                write_rotation(walls, body, anchors.tetrahedron, walls.first[before], k)
+                write_rotation(sheets, body, anchors.tetrahedron, sheets.first[before], k)
         before = k
     if before >= 0:
-        write_rotation(walls, body, anchors.tetrahedron, walls.first[before], n)
+        write_rotation(sheets, body, anchors.tetrahedron, sheets.first[before], n)
 
 
 @kernel
@@ -124,7 +125,7 @@ def rest_offset(pose: BladePose, rotation: Matrix3, n: int, k: int, beside: int)
 
     Args:
         pose: Pose of the blade now.
-        rotation: Rotation of the tissue there (see `find_walls`).
+        rotation: Rotation of the tissue there (see `find_sheets`).
         n: Number of samples.
         k: Sample at which the vector ends.
         beside: Sample at which it begins.

@@ -1,20 +1,20 @@
 """The path of the cutting edge through the material: from anchors to the path that is cut.
 
 The path is a chain of material points, one a sample. Samples in the tissue are at their anchors. A
-few more samples on either side reach out through the skin, so that the sheet always ends outside
-the body or at a real end of the blade; their offset from the anchored neighbour is that on the
-blade.
+few more samples on either side reach out through the skin, so that the cut surface always ends
+outside the body or at a real end of the blade; their offset from the anchored neighbour is that on
+the blade.
 """
 
-from tissue.blade.anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
 from tissue.blade.blade_state import BladeState
+from tissue.blade.body_sheets import join_sheet, rotation_of_sheet
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement
-from tissue.blade.material_frame import find_walls, rest_offset
-from tissue.blade.walls import join_wall, rotation_of_wall
+from tissue.blade.edge_anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
+from tissue.blade.material_frame import find_sheets, rest_offset
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
-from tissue.cutting.blade_path import Path, note_way
-from tissue.geometry.polar_decomposition import apply_transposed
+from tissue.cutting.blade_path import Path, average_directions
+from tissue.geometry.rotations import apply_transposed
 from tissue.mesh.body import OUTER, Body, walk
 
 OUTREACH = 6
@@ -25,14 +25,15 @@ SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""
 
 LONGEST_LINK = 2.0
-"""How much longer than on the blade the sheet between two samples may be, per
-`BladeState.reach`. Beyond it they hold two walls: a sheet between them would cut where no blade
-was."""
+"""Excess of the cut between two samples over its length on the blade, at most, per
+`BladeState.reach`. Beyond it they hold two sheets: a cut surface between them would cut where no
+blade was."""
 
 LONGEST_JUMP = 4.0
-"""How far from where it was a sample may take hold anew and its path go on, per `BladeState.reach`:
-about an edge of a tetrahedron, which is 3 to 4 node sizes. Further away it holds another wall,
-where its path begins. An anchor that slips may go further: all that it slips through is cut."""
+"""Distance within which a sample may take hold again and its path continue, per
+`BladeState.reach`: about an edge of a tetrahedron, which is 3 to 4 node sizes. Further away it
+holds another sheet, where its path begins. An anchor that slips may go further: all that it slips
+through is cut."""
 
 STEEPEST = 1.0
 """Displacement of the path sideways per displacement ahead, at most. Steeper steps leave tetrahedra
@@ -45,20 +46,20 @@ def trace_path(
 ) -> None:
     """Write the path of the samples since the last call. Samples that left are freed.
 
-    Each wall is followed by itself: with its own rotation, and a beginning and an end of its own.
+    Each sheet is followed by itself: with its own rotation, and a beginning and an end of its own.
 
     Args:
         blade: The anchors at the end of the step.
         body: The tissue.
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
-        margin: How far outside the skin the sheet begins and ends [m].
+        margin: How far outside the skin the cut surface begins and ends [m].
         path: Written; its last end is the new start.
     """
     anchors = blade.anchors
     n = len(anchors.state)
     pose = pose_at(edge, when)
-    find_walls(anchors, body, blade.reach)
+    find_sheets(anchors, body, blade.reach)
     _note_progress(anchors)
     _note_passage(anchors, path)
     for k in range(n):
@@ -76,10 +77,10 @@ def trace_path(
     for k in range(n):
         if path.member[k]:
             _begin_or_go_on(blade, body, k, margin, path)
-    note_way(path, blade.reach)
+    average_directions(path, blade.reach)
     for k in range(n):
         path.known[k] = path.member[k]
-        if anchors.walls.first[k] == k and anchors.walls.has_left[k]:
+        if anchors.sheets.first[k] == k and anchors.sheets.has_left[k]:
             path.has_left = 1
         if anchors.state[k] == LEFT:
             anchors.state[k] = FREE
@@ -87,23 +88,23 @@ def trace_path(
 
 @kernel
 def _note_progress(anchors: Anchors) -> None:
-    """Note of each wall whether an anchor in it has cut, whether one pulls, and if all left."""
-    walls = anchors.walls
+    """Find of each sheet whether an anchor in it has cut, whether one pulls, and if all left."""
+    sheets = anchors.sheets
     for k in range(len(anchors.state)):
-        wall = walls.first[k]
-        if wall == k:
-            walls.has_begun[k] = walls.is_cut[k] = False
-            walls.has_left[k] = True
-        if wall >= 0:
+        sheet = sheets.first[k]
+        if sheet == k:
+            sheets.has_begun[k] = sheets.is_cut[k] = False
+            sheets.has_left[k] = True
+        if sheet >= 0:
             pulls = anchors.state[k] == ANCHORED or anchors.state[k] == LEFT
-            walls.is_cut[wall] = walls.is_cut[wall] or pulls
-            walls.has_begun[wall] = walls.has_begun[wall] or anchors.slipped[k]
-            walls.has_left[wall] = walls.has_left[wall] and anchors.state[k] == LEFT
+            sheets.is_cut[sheet] = sheets.is_cut[sheet] or pulls
+            sheets.has_begun[sheet] = sheets.has_begun[sheet] or anchors.slipped[k]
+            sheets.has_left[sheet] = sheets.has_left[sheet] and anchors.state[k] == LEFT
 
 
 @kernel
 def _note_passage(anchors: Anchors, path: Path) -> None:
-    """Note whether an end of the edge holds tissue, and whether the edge leaves all of it ahead."""
+    """Store whether an end of the edge holds tissue, and whether the edge leaves all ahead."""
     state = anchors.state
     if state[0] != FREE or state[len(state) - 1] != FREE:
         path.has_end_in = 1
@@ -131,11 +132,11 @@ def _follow_anchor(
         edge: The cutting edge over the time step.
         pose: Pose of the blade.
         k: The sample.
-        margin: How far outside the skin the sheet begins and ends [m].
+        margin: How far outside the skin the cut surface begins and ends [m].
         path: Written.
     """
     anchors = blade.anchors
-    rotation = rotation_of_wall(anchors.walls, k)
+    rotation = rotation_of_sheet(anchors.sheets, k)
     ahead = apply_transposed(rotation, pose.forward)
     store(path.forward, k, ahead)
     store(path.sideways, k, apply_transposed(rotation, pose.normal))
@@ -149,7 +150,7 @@ def _follow_anchor(
         store(path.t1, k, at)
     elif not path.known[k]:
         store(path.t1, k, _behind(body, at, margin, ahead, path.seed[k]))
-    # Where the blade backs off, the sheet does not go on.
+    # Where the blade backs off, the cut surface does not go on.
     if (
         anchors.state[k] == LEFT
         and dot(sample_displacement(edge, k, len(anchors.state)), pose.forward) > 0.0
@@ -159,15 +160,15 @@ def _follow_anchor(
 
 @kernel
 def _begin_or_go_on(blade: BladeState, body: Body, k: int, margin: float, path: Path) -> None:
-    """Write where the step of sample `k` begins: where it was, or where it met a wall."""
-    walls = blade.anchors.walls
-    wall = walls.first[k]
+    """Write where the step of sample `k` begins: where it was, or where it met a sheet."""
+    sheets = blade.anchors.sheets
+    sheet = sheets.first[k]
     ahead = vec3(path.forward, k)
-    if walls.has_left[wall]:
+    if sheets.has_left[sheet]:
         store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
     if path.known[k]:
         _limit_step(path, k)
-    elif walls.has_begun[wall] and walls.is_cut[wall]:
+    elif sheets.has_begun[sheet] and sheets.is_cut[sheet]:
         # A new member begins outside the skin, behind where it is now.
         store(path.t0, k, _behind(body, vec3(path.t1, k), margin, ahead, path.seed[k]))
     else:
@@ -179,7 +180,7 @@ def forget_path(path: Path) -> None:
     """Forget where the edge has been: the next path begins at the next contact."""
     path.has_left = path.has_end_in = path.is_through = 0
     for end in range(2):
-        store(path.way, end, Vec3(0.0, 0.0, 0.0))
+        store(path.direction, end, Vec3(0.0, 0.0, 0.0))
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False
@@ -187,7 +188,7 @@ def forget_path(path: Path) -> None:
 
 @kernel
 def _behind(body: Body, p: Vec3, margin: float, ahead: Vec3, seed: int) -> Vec3:
-    """Return where a sheet begins that the edge enters at `p` [m]: outside the skin, or in a slit.
+    """Return where the cut begins that the edge enters at `p` [m]: outside the skin, or in a slit.
 
     In the midst of tissue, where a tip was driven in, it begins at `p` itself.
     """
@@ -199,7 +200,7 @@ def _behind(body: Body, p: Vec3, margin: float, ahead: Vec3, seed: int) -> Vec3:
 
 @kernel
 def _extend_beyond_skin(body: Body, k: int, p: Vec3, path: Path) -> None:
-    """End the sheet at `p` [m], where sample `k` left the body, if that is outside."""
+    """End the cut surface at `p` [m], where sample `k` left the body, if that is outside."""
     at = walk(body, p, path.seed[k])
     if not at.inside and at.link == OUTER:
         store(path.t1, k, p)
@@ -209,9 +210,9 @@ def _extend_beyond_skin(body: Body, k: int, p: Vec3, path: Path) -> None:
 def _place_beside(blade: BladeState, pose: BladePose, k: int, path: Path) -> None:
     """Place a free sample from the nearest samples that are, or just were, in the tissue.
 
-    Between two walls it goes with one of them: the nearer one along the edge.
+    Between two sheets it goes with one of them: the nearer one along the edge.
     """
-    anchors, walls = blade.anchors, blade.anchors.walls
+    anchors, sheets = blade.anchors, blade.anchors.sheets
     n = len(anchors.state)
     n_beside = 0
     p = Vec3(0.0, 0.0, 0.0)
@@ -219,11 +220,11 @@ def _place_beside(blade: BladeState, pose: BladePose, k: int, path: Path) -> Non
         for beside in range(k - distance, k + distance + 1, 2 * distance):
             if not 0 <= beside < n or anchors.state[beside] == FREE:
                 continue
-            if n_beside == 1 and walls.first[beside] != walls.first[k]:
+            if n_beside == 1 and sheets.first[beside] != sheets.first[k]:
                 continue
             n_beside += 1
-            join_wall(walls, k, beside)
-            offset = rest_offset(pose, rotation_of_wall(walls, beside), n, k, beside)
+            join_sheet(sheets, k, beside)
+            offset = rest_offset(pose, rotation_of_sheet(sheets, beside), n, k, beside)
             at = add(vec3(path.t1, beside), offset)
             p = add(p, at)
             if _is_elsewhere(path, k, beside, at, blade.reach):
@@ -231,14 +232,14 @@ def _place_beside(blade: BladeState, pose: BladePose, k: int, path: Path) -> Non
         if n_beside > 0:
             path.member[k] = True
             store(path.t1, k, scale(1.0 / n_beside, p))
-            store(path.forward, k, vec3(path.forward, walls.first[k]))
-            store(path.sideways, k, vec3(path.sideways, walls.first[k]))
+            store(path.forward, k, vec3(path.forward, sheets.first[k]))
+            store(path.sideways, k, vec3(path.sideways, sheets.first[k]))
             return
 
 
 @kernel
 def _is_elsewhere(path: Path, k: int, beside: int, p: Vec3, reach: float) -> bool:
-    """Return whether a free sample was with another wall than the one that it is placed with now.
+    """Return whether a free sample was with another sheet than the one that it is placed with now.
 
     It is where it was not near the sample that it is placed beside.
 
@@ -274,7 +275,7 @@ def _smooth(path: Path) -> None:
     """Smooth how far samples beside each other lie sideways, over about a node size.
 
     Anchors in different tetrahedra are dragged sideways by different amounts. The mesh cannot hold
-    a fold of the sheet that is finer than its tetrahedra; it would tear along one.
+    a fold of the cut surface that is finer than its tetrahedra; it would tear along one.
     """
     n = len(path.member)
     for _ in range(SMOOTHING):
@@ -293,7 +294,7 @@ def _smooth(path: Path) -> None:
 def _limit_step(path: Path, k: int) -> None:
     """Hold a sample back that is not ahead of where it has been, or moves more sideways than ahead.
 
-    The first is in its own cut; the second would fold the sheet.
+    The first is in its own cut; the second would fold the cut surface.
     """
     start, sideways = vec3(path.t0, k), vec3(path.sideways, k)
     step = sub(vec3(path.t1, k), start)

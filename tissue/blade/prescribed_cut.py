@@ -3,15 +3,16 @@
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.edge import LEAST_SINE
+from tissue.blade.edge import LEAST_SINE, expect_small_turn
 from tissue.blade.interaction import MOST_SAMPLES, SAMPLES_PER_NODE_SIZE
-from tissue.blade.prescribed_path import begin_path, prescribe_path
-from tissue.blade.sweep_checks import expect_small_turn
 from tissue.core.array_types import FloatArray
-from tissue.core.vec3 import Vec3
-from tissue.cutting.blade_path import path_travel, resampled
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
+from tissue.cutting.blade_path import Path, average_directions, path_travel, resampled
 from tissue.cutting.incision import CutHooks, Incision
-from tissue.mesh.tetrahedron_grid import build_grid, list_appended
+from tissue.mesh.body import Body, walk
+from tissue.mesh.point_location import tetrahedron_at, tetrahedron_in_box
+from tissue.mesh.tetrahedron_grid import TetrahedronGrid, build_grid, list_appended
 
 
 def cut_along(
@@ -65,21 +66,99 @@ def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatAr
             f"edges have shape {rows.shape}; they are two or more places of two or more points: "
             "(n_places, n_points, 3)"
         )
-    ways = np.array(forward, dtype=np.float64)
-    if ways.shape not in ((3,), (len(rows), 3)):
-        raise ValueError(f"forward has shape {ways.shape}; it is (3,) or ({len(rows)}, 3)")
-    if not (np.isfinite(rows).all() and np.isfinite(ways).all()):
+    directions = np.array(forward, dtype=np.float64)
+    if directions.shape not in ((3,), (len(rows), 3)):
+        raise ValueError(f"forward has shape {directions.shape}; it is (3,) or ({len(rows)}, 3)")
+    if not (np.isfinite(rows).all() and np.isfinite(directions).all()):
         raise ValueError("edges and forward hold a number that is not finite")
-    ways = np.broadcast_to(ways, (len(rows), 3)).copy()
+    directions = np.broadcast_to(directions, (len(rows), 3)).copy()
     along = rows[:, -1] - rows[:, 0]
-    across = np.linalg.norm(np.cross(along, ways), axis=1)
-    limit = LEAST_SINE * np.linalg.norm(along, axis=1) * np.linalg.norm(ways, axis=1)
+    across = np.linalg.norm(np.cross(along, directions), axis=1)
+    limit = LEAST_SINE * np.linalg.norm(along, axis=1) * np.linalg.norm(directions, axis=1)
     wrong = np.flatnonzero(~(across > limit))
     if len(wrong):
         i = int(wrong[0])
         raise ValueError(
             f"the edge in place {i} has no length or cuts along itself: forward is "
-            f"{ways[i].tolist()}, from tip to heel is {along[i].tolist()}"
+            f"{directions[i].tolist()}, from tip to heel is {along[i].tolist()}"
         )
-    expect_small_turn(along, ways)
-    return rows, ways / np.linalg.norm(ways, axis=1)[:, None]
+    expect_small_turn(along, directions)
+    return rows, directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+@kernel
+def begin_path(path: Path, points: FloatArray) -> None:
+    """Begin the path with the edge at `points` [m], shape (n, 3), in the body at rest."""
+    n = len(path.member)
+    for k in range(n):
+        store(path.t1, k, vec3(points, k))
+        path.seed[k] = -1
+        path.member[k] = True
+        path.known[k] = True
+        path.linked[k] = k + 1 < n
+
+
+@kernel
+def prescribe_path(
+    path: Path,
+    body: Body,
+    grid: TetrahedronGrid,
+    points: FloatArray,
+    forward: Vec3,
+    node_size: float,
+) -> None:
+    """Advance the edge to given points.
+
+    A sample that is not ahead of where it has been is held there: only the edge cuts, not the back.
+
+    Args:
+        path: Written; its last end is the new start.
+        body: The tissue.
+        grid: Where its tetrahedra are at rest.
+        points: Points of the edge in the body at rest [m], shape (n, 3).
+        forward: Unit vector in which the edge cuts, in the body at rest.
+        node_size: Mean node size of the body [m].
+    """
+    n = len(path.member)
+    along = sub(vec3(points, n - 1), vec3(points, 0))
+    normal = cross(forward, along)
+    sideways = scale(1.0 / norm(normal), normal)
+    for k in range(n):
+        store(path.sideways, k, sideways)
+        start = vec3(path.t1, k)
+        p = vec3(points, k)
+        store(path.t0, k, start)
+        store(path.forward, k, forward)
+        if dot(sub(p, start), forward) > 0.0:
+            store(path.t1, k, p)
+    average_directions(path, node_size)
+    for k in range(n):
+        path.seed[k] = _find_seed(path, body, grid, k)
+
+
+@kernel
+def _find_seed(path: Path, body: Body, grid: TetrahedronGrid, k: int) -> int:
+    """Return a tetrahedron that holds sample `k`, or one that its segment may sweep through."""
+    p = vec3(path.t1, k)
+    if path.seed[k] >= 0:
+        at = walk(body, p, path.seed[k])
+        if at.inside:
+            return at.tetrahedron
+    t = tetrahedron_at(body, grid, body.rest, p)
+    if t >= 0:
+        return t
+    other = min(k + 1, len(path.member) - 1)
+    a = vec3(path.t0, k)
+    b = vec3(path.t0, other)
+    c = vec3(path.t1, other)
+    low = Vec3(
+        min(min(a.x, b.x), min(c.x, p.x)),
+        min(min(a.y, b.y), min(c.y, p.y)),
+        min(min(a.z, b.z), min(c.z, p.z)),
+    )
+    high = Vec3(
+        max(max(a.x, b.x), max(c.x, p.x)),
+        max(max(a.y, b.y), max(c.y, p.y)),
+        max(max(a.z, b.z), max(c.z, p.z)),
+    )
+    return tetrahedron_in_box(body, grid, body.rest, low, high)

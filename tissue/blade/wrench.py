@@ -9,24 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.anchors import ANCHORED, anchor_position, pulling_point, surplus_stretch
-from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import (
-    PRESSING,
-    blunt_side,
-    press_force,
-    press_of,
-    touched_point,
-)
+from tissue.blade.blade_state import BladeState, ImpulseTotals
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
-from tissue.blade.impulse_totals import ImpulseTotals
-from tissue.blade.side_contact import (
+from tissue.blade.edge_anchors import ANCHORED, anchor_position, pulling_point, surplus_stretch
+from tissue.blade.faces_contact import (
     POINTS,
     contact_forces,
     contact_point,
     corners_of,
     is_clear,
     penetration,
+)
+from tissue.blade.spine_contact import (
+    PRESSING,
+    press_force,
+    press_of,
+    spine_side,
+    touched_point,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -92,7 +91,7 @@ class Amounts(NamedTuple):
 def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
     """Return a report without contacts, with room for all of the blade, and `n_more`."""
     capacity = (
-        n_more + len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.blunt.state)
+        n_more + len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.spine.state)
     )
     plain = np.zeros(18 + len(Amounts._fields))
     return WrenchReport(
@@ -198,8 +197,8 @@ def write_report(report: WrenchReport, blade: BladeState, body: Body, edge: Edge
             report.stiffness[i, j] = 0.0
     pose = pose_at(edge, 1.0)
     _report_edge(report, blade, body, pose, edge.tip_t1)
-    _report_sides(report, blade, body, pose, edge.tip_t1)
-    _report_blunt_sides(report, blade, body, pose, edge.tip_t1)
+    _report_faces(report, blade, body, pose, edge.tip_t1)
+    _report_spine(report, blade, body, pose, edge.tip_t1)
     for i in range(6):
         for j in range(i):
             mean = 0.5 * (report.stiffness[i, j] + report.stiffness[j, i])
@@ -257,7 +256,7 @@ def _report_edge(
 
 
 @kernel
-def _report_sides(
+def _report_faces(
     report: WrenchReport, blade: BladeState, body: Body, pose: BladePose, about: Vec3
 ) -> None:
     """Add the side contacts to the report; torques are about a point [m]."""
@@ -282,28 +281,28 @@ def _report_sides(
 
 
 @kernel
-def _report_blunt_sides(
+def _report_spine(
     report: WrenchReport, blade: BladeState, body: Body, pose: BladePose, about: Vec3
 ) -> None:
     """Add the contacts of the blunt sides to the report; torques are about a point [m]."""
-    blunt = blade.blunt
-    if blunt.n_pressing == 0:
+    spine = blade.spine
+    if spine.n_pressing == 0:
         return
-    for k in range(len(blunt.state)):
-        if blunt.state[k] < PRESSING:
+    for k in range(len(spine.state)):
+        if spine.state[k] < PRESSING:
             continue
-        side = blunt_side(blunt, pose, k)
-        p = touched_point(blunt, body, body.positions, k)
-        press = press_of(blunt, k, side, pose.normal, p, blade.toughness)
+        side = spine_side(spine, pose, k)
+        p = touched_point(spine, body, body.positions, k)
+        press = press_of(spine, k, side, pose.normal, p, blade.toughness)
         if press.depth <= 0.0:
             continue
-        force = press_force(blunt, k, side, pose.normal, press)
+        force = press_force(spine, k, side, pose.normal, press)
         lever = sub(p, about)
         push = dot(force, side.outward)
         _add_force(report, lever, force)
         # A sample that pierces presses no harder when it is pressed farther.
         if press.surplus == 0.0:
-            _add_stiffness_along(report, lever, blunt.stiffness[k], side.outward)
+            _add_stiffness_along(report, lever, spine.stiffness[k], side.outward)
         friction = axpy(-push, side.outward, force)
         _add_contact(report, p, side.outward, push, friction, 0.0)
 

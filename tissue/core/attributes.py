@@ -1,7 +1,7 @@
 """The attributes of an object, read and set without a dictionary of them.
 
-An object keeps its attributes in places of its own until its `__dict__` is asked for. From then on,
-in CPython 3.11 and 3.12, they are in a dictionary, and each is looked up there for as long as the
+An object keeps its attributes in places of its own until its `__dict__` is read. From then on,
+in CPython 3.11 and 3.12, they are in a dictionary, and each is found there for as long as the
 object lives: steps of a small body took 7 % longer once its state had been saved.
 """
 
@@ -23,7 +23,7 @@ def attributes_of(value: Any) -> dict[str, Any]:
     """Return the attributes of an object by their names.
 
     Names are those in the code of its class. What the object refers to tells whether these are all;
-    if not, its dictionary is asked for.
+    if not, its dictionary is read.
     """
     kind = type(value)
     found = _attributes_among(_USUAL.get(kind, {}), value)
@@ -57,7 +57,7 @@ def _attributes_among(defaults: _Defaults, value: Any) -> dict[str, Any] | None:
 
 
 def set_attributes(owner: Any, attributes: dict[str, Any], own: frozenset[str]) -> None:
-    """Give an object these attributes and no others.
+    """Set these attributes of an object and no others.
 
     Args:
         owner: The object.

@@ -54,7 +54,7 @@ def _compiled(function: F, flags: dict[str, Any]) -> F:
 class SameTypes(Generic[F]):
     """A kernel for a caller whose arguments have the same types in each call: `name.call(...)`.
 
-    Numba looks up the type of each argument in each call, which takes 0.3 us for a struct; here it
+    Numba finds the type of each argument in each call, which takes 0.3 us for a struct; here it
     does so in the first call alone. Later ones are not checked: a float becomes whole where the
     first one was. So this is for arguments that are made here, structs, floats and arrays of the
     caller's own, and not for what a user passes.

@@ -1,21 +1,60 @@
-"""Keeps compiled kernels on disk, in a form that can be copied to another machine.
+"""The folder of compiled kernels, in a form that can be copied to another machine.
 
-Numba finds a cached function by the path of its source file. Here it is the name of its module, in
-the folder of `jit.cache_directory`: a copy serves an installation at any other path.
+There is one folder for each state of the sources, compiler and processor. Numba finds a cached
+function by the path of its source file. Here it is the name of its module, in `cache_directory`: a
+copy serves an installation at any other path.
 """
 
 import functools
 import hashlib
 import logging
+import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import llvmlite.binding as llvm
+import numba as nb
+import platformdirs
 from numba.core import caching, compiler
 
-from tissue.core.cache_directory import cache_directory
+# A kernel contains kernels from other files, so the folder is named after all of them: editing one
+# can never revive an old binary.
+_SOURCES = sorted(Path(__file__).parents[1].rglob("*.py"))
+
+_DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()[:16]
 
 _log = logging.getLogger(__name__)
+
+
+def cache_root() -> Path:
+    """Return the folder that holds all caches: $NUMBA_CACHE_DIR, else the user's cache folder."""
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("scalpel-sim"))
+
+
+def cache_directory() -> Path:
+    """Return where kernels of exactly these sources are kept for exactly this processor."""
+    return cache_root() / "kernels" / f"{_DIGEST}-{_machine()}"
+
+
+def n_compiled_kernels() -> int:
+    """Return how many kernels are in `cache_directory`, compiled by any process."""
+    return sum(1 for _ in cache_directory().glob("*/*-part.*.nbc"))
+
+
+@functools.cache
+def _machine() -> str:
+    """Return a digest of the version of Numba and the processor that it compiles for.
+
+    In a folder that is found by it all files fit. One image can hold those of several processors.
+    """
+    config = cast(Any, nb.config)
+    processor = config.CPU_NAME or llvm.get_host_cpu_name()
+    features = config.CPU_FEATURES
+    if features is None:
+        features = llvm.get_host_cpu_features().flatten()
+    described = f"{nb.__version__} {llvm.get_process_triple()} {processor} {features}"
+    return hashlib.sha256(described.encode()).hexdigest()[:8]
 
 
 class _Locator(caching._CacheLocator):
@@ -101,7 +140,7 @@ class _Results(caching.CacheImpl):
 class _Files(caching.IndexDataCacheFile):
     """One file for each signature, named after it.
 
-    Numba keeps an index beside numbered files; two processes that write at once mix them up.
+    Numba keeps an index next to numbered files; two processes that write at once mix them up.
     """
 
     def save(self, key: Any, data: Any) -> None:

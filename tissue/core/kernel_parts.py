@@ -9,7 +9,8 @@ the time, to the same bits.
 """
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, Self, cast
 
@@ -24,7 +25,7 @@ from numba.core.typed_passes import (
     NopythonTypeInference,
     PreLowerStripPhis,
 )
-from numba.core.types import unliteral
+from numba.core.types import Function, unliteral
 from numba.core.untyped_passes import (
     DeadBranchPrune,
     FixupArgs,
@@ -35,8 +36,14 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from tissue.core.compile_shortcuts import shortcuts
 from tissue.core.kernel_cache import KernelCache
+
+_function_type: Any = Function
+
+_get_call_type = _function_type.get_call_type
+
+_SIGNATURES: dict[tuple[Any, tuple[Any, ...]], Any] = {}
+"""Signatures that were found, by function and types of the arguments."""
 
 
 class _Origin(NamedTuple):
@@ -247,7 +254,7 @@ class _ProgramCompiler(compiler.CompilerBase):
 
 
 _PARTS: dict[Callable[..., Any], Any] = {}
-"""What compiles the part of each kernel."""
+"""Compiler of the part of each kernel."""
 
 
 def _part_of(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -267,7 +274,7 @@ def in_parts(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     program._cache = KernelCache(function, _Program)
 
     def call_template(arguments: Any, keywords: Any) -> Any:
-        """Let calls with constants share the code of calls with variables.
+        """Make calls with constants share the code of calls with variables.
 
         Numba compiles a function again for each constant that another kernel passes to it: a third
         of the engine's compile time, for code that is inlined anyway.
@@ -280,3 +287,31 @@ def in_parts(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     program.get_call_template = call_template  # other kernels call the part
     program.get_overload = part.get_overload
     return program
+
+
+@contextmanager
+def shortcuts() -> Iterator[None]:
+    """Compile without what is done twice or for nobody. Blocks may be nested; one thread compiles.
+
+    For each `a + b` Numba tries some eighty implementations one after the other, once to find the
+    type and once to find the code. Here the signature is remembered. And Numba tells each function
+    that is being compiled of each call of LLVM, for a sum of times that nobody reads.
+    """
+    lock = llvm.ffi.lib._lock
+    listeners, lock._cblist = lock._cblist, []
+    before, _function_type.get_call_type = _function_type.get_call_type, _call_type
+    try:
+        yield
+    finally:
+        lock._cblist = listeners
+        _function_type.get_call_type = before
+
+
+def _call_type(function: Any, context: Any, args: Any, keywords: Any) -> Any:
+    """Return the signature of a call with arguments of these types."""
+    if keywords:
+        return _get_call_type(function, context, args, keywords)
+    call = function, tuple(args)
+    if call not in _SIGNATURES:
+        _SIGNATURES[call] = _get_call_type(function, context, args, keywords)
+    return _SIGNATURES[call]

@@ -1,4 +1,4 @@
-"""How much may be asked of a tissue: the same in a program, in a run and over TCP."""
+"""Limits of requests to a tissue: the same in a program, in a run and over TCP."""
 
 LARGEST_STRENGTH = 1e9
 """Largest stiffness [N/m], damping [N s/m] and toughness [J/m2] of what holds tissue, far beyond

@@ -16,19 +16,21 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.attributes import attributes_of, set_attributes
-from tissue.core.memory_blocks import PackedMemory, packed, unpacked
-from tissue.core.struct_memory import (
+from tissue.core.memory_blocks import (
+    PackedMemory,
     StructMemory,
     StructPart,
     StructRules,
     memory_of,
+    packed,
     parts_of,
+    unpacked,
 )
 from tissue.core.structs import Arrays, Vectors
 
 
 class StateRules(NamedTuple):
-    """What in a tree of objects is no state. Attributes are named `Class.attribute`."""
+    """Attributes in a tree of objects that are no state. Attributes are named `Class.attribute`."""
 
     packages: frozenset[str]
     """Packages whose classes are walked. Objects of others are kept as they are."""
@@ -42,7 +44,7 @@ class StateRules(NamedTuple):
     unwritten: frozenset[str] = frozenset()
     """Attributes that are not in the plain form: an object that is put to it keeps its own."""
     structs: StructRules = StructRules()
-    """What of the memory of structs is state."""
+    """Parts of the memory of structs that are state."""
     made: Mapping[str, type] = MappingProxyType({})
     """Classes of objects that are made where a state from elsewhere has more of them, by name."""
 
@@ -60,7 +62,7 @@ class StateRules(NamedTuple):
 
 
 class Spares:
-    """What mementos of one tree use again: the table of its memory, and room for what is in it.
+    """Memory that mementos of one tree share: the table of its memory, and room for what is in it.
 
     Memory that is new costs three times as much as the copy: the system clears each page.
     """
@@ -75,7 +77,7 @@ class Spares:
         """Return the memory of structs, which mostly are those of the last call."""
         ids, known = [*map(id, structs)], [*map(id, self._structs)]
         if self._memory is None or ids != known:
-            # Of 70 structs a cut replaces one or two: to look at the arrays of all takes 1 ms.
+            # Of 70 structs a cut replaces one or two: a test of the arrays of all takes 1 ms.
             parts = dict(zip(known, self._parts, strict=True))
             self._parts = [
                 parts[i] if i in parts else parts_of(struct, rules)
@@ -101,7 +103,7 @@ _LEAF, _OBJECT, _STRUCT, _ARRAY, _TUPLE, _LIST, _DICT = range(7)
 
 
 class Memento:
-    """What a tree of objects is now.
+    """A tree of objects as it is now.
 
     Args:
         root: Its root.
@@ -129,7 +131,7 @@ class Memento:
         self.memory = self._spares.memory(self.structs, rules.structs)
         """Where their memory is."""
         self.packed = packed(self.memory.spans, self._spares.room())
-        """What was in it."""
+        """Contents of the tree."""
         self.tails = [tail.copy() for tail in self.memory.tails]
         """The bytes behind whole words."""
         del self._kinds, self._seen
@@ -140,7 +142,7 @@ class Memento:
             self._spares.keep(self.packed)
 
     def _walk(self, value: Any) -> None:
-        """Note an object, and what it refers to."""
+        """Add an object, and those that it refers to."""
         kind = self._kinds.of(value)
         if kind == _LEAF or id(value) in self._seen:
             return
@@ -224,7 +226,7 @@ def derived_in(rules: StateRules, kind: type) -> dict[str, Callable[[], Any]]:
 
 
 class _Kinds:
-    """How objects of each class are walked, under some rules."""
+    """Order in which objects of each class are walked, under some rules."""
 
     def __init__(self, rules: StateRules) -> None:
         self._rules = rules

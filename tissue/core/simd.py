@@ -68,14 +68,14 @@ LANES = LanesType(WIDTH)
 UNFUSED = LanesType(WIDTH, is_unfused=True)
 LANES_OF_SINGLES = LanesType(2 * WIDTH, is_single=True)
 POINT = LanesType(4)
-_THREE = cast(Any, types).UniTuple(LANES, 3)
-_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
-_POINT = ir.VectorType(ir.DoubleType(), 4)
+THREE_LANES = cast(Any, types).UniTuple(LANES, 3)
+LANES_IR = ir.VectorType(ir.DoubleType(), WIDTH)
+POINT_IR = ir.VectorType(ir.DoubleType(), 4)
 _XYZ = ir.Constant(ir.VectorType(ir.IntType(1), 4), [1, 1, 1, 0])
-_I32 = ir.IntType(32)
-_EVEN, _ODD = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
-_FIRST, _SECOND = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
-_I64 = ir.IntType(64)
+I32 = ir.IntType(32)
+EVEN, ODD = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
+FIRST, SECOND = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
+I64 = ir.IntType(64)
 
 
 @register_model(LanesType)
@@ -89,10 +89,10 @@ class _LanesModel(models.PrimitiveModel):
 _Function = Callable[..., Any]
 
 
-def _compiled(
+def intrinsic(
     function: _Function, *kinds: Any, result: types.Type | _Function = LANES
 ) -> Callable[[_Function], _Function]:
-    """Give `function`, on arguments of these kinds, the code that the decorated one builds.
+    """Compile `function`, on arguments of these kinds, to the code that the decorated one builds.
 
     It is called with the builder and the values of the arguments. `result` is the type of what it
     returns, or a function that finds it from the types of the arguments.
@@ -116,7 +116,7 @@ def _compiled(
     def register(build: _Function) -> _Function:
         def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             arguments = [
-                _Array(context, builder, kind, value) if isinstance(kind, types.Array) else value
+                Operand(context, builder, kind, value) if isinstance(kind, types.Array) else value
                 for kind, value in zip(signature.args, values, strict=True)
             ]
             made = build(builder, *arguments)
@@ -128,7 +128,7 @@ def _compiled(
     return register
 
 
-class _Array:
+class Operand:
     """An array argument: where its elements are."""
 
     def __init__(self, context: Any, builder: Any, kind: types.Array, value: Any) -> None:
@@ -140,19 +140,20 @@ class _Array:
         """Return a pointer to element `i`, or to the first of row `i`."""
         builder = self._builder
         if i.type.width < 64:
-            i = builder.sext(i, _I64)
+            i = builder.sext(i, I64)
         if n_columns > 1:
-            i = builder.mul(i, ir.Constant(_I64, n_columns))
+            i = builder.mul(i, ir.Constant(I64, n_columns))
         return builder.gep(self._data, [i])
 
 
-def _shuffled(builder: Any, a: Any, b: Any, order: Any) -> Any:
+def shuffled(builder: Any, a: Any, b: Any, order: Any) -> Any:
+    """Return the lanes of `a`, followed by those of `b`, in another order."""
     lanes = list(order)
-    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_I32, len(lanes)), lanes))
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(lanes)), lanes))
 
 
 def _operator(function: _Function, instruction: str, kind: LanesType) -> None:
-    @_compiled(function, kind, kind, result=kind)
+    @intrinsic(function, kind, kind, result=kind)
     def _build(builder: Any, a: Any, b: Any) -> Any:
         # A product and a sum may become one instruction that rounds once: faster, and no less
         # exact. Nothing is reordered.
@@ -172,14 +173,15 @@ def lanes(value: float) -> Lanes:
     return np.full(WIDTH, value)
 
 
-@_compiled(lanes, types.Float)
+@intrinsic(lanes, types.Float)
 def _lanes(builder: Any, value: Any) -> Any:
-    return _everywhere(builder, value, _VECTOR)
+    return in_all_lanes(builder, value, LANES_IR)
 
 
-def _everywhere(builder: Any, value: Any, kind: Any) -> Any:
-    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(_I32, 0))
-    return _shuffled(builder, one, one, [0] * kind.count)
+def in_all_lanes(builder: Any, value: Any, kind: Any) -> Any:
+    """Return a vector that holds `value` in all lanes."""
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(I32, 0))
+    return shuffled(builder, one, one, [0] * kind.count)
 
 
 def load_lanes(array: FloatArray, i: int) -> Lanes:
@@ -187,9 +189,9 @@ def load_lanes(array: FloatArray, i: int) -> Lanes:
     return array[i : i + WIDTH].copy()
 
 
-@_compiled(load_lanes, types.Array, types.Integer)
-def _load(builder: Any, array: _Array, i: Any) -> Any:
-    return builder.load(builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
+@intrinsic(load_lanes, types.Array, types.Integer)
+def _load(builder: Any, array: Operand, i: Any) -> Any:
+    return builder.load(builder.bitcast(array.at(i), LANES_IR.as_pointer()), align=8)
 
 
 def store_lanes(array: FloatArray, i: int, values: Lanes) -> None:
@@ -197,10 +199,10 @@ def store_lanes(array: FloatArray, i: int, values: Lanes) -> None:
     array[i : i + WIDTH] = values
 
 
-@_compiled(store_lanes, types.Array, types.Integer, LANES, result=types.void)
-@_compiled(store_lanes, types.Array, types.Integer, UNFUSED, result=types.void)
-def _store(builder: Any, array: _Array, i: Any, values: Any) -> None:
-    builder.store(values, builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
+@intrinsic(store_lanes, types.Array, types.Integer, LANES, result=types.void)
+@intrinsic(store_lanes, types.Array, types.Integer, UNFUSED, result=types.void)
+def _store(builder: Any, array: Operand, i: Any, values: Any) -> None:
+    builder.store(values, builder.bitcast(array.at(i), LANES_IR.as_pointer()), align=8)
 
 
 def unfused(a: Lanes) -> Lanes:
@@ -211,7 +213,7 @@ def unfused(a: Lanes) -> Lanes:
     return a
 
 
-@_compiled(unfused, LANES, result=UNFUSED)
+@intrinsic(unfused, LANES, result=UNFUSED)
 def _unfused(_: Any, a: Any) -> Any:
     return a
 
@@ -221,10 +223,10 @@ def square_root(a: Lanes) -> Lanes:
     return np.sqrt(a)
 
 
-@_compiled(square_root, LANES)
-@_compiled(square_root, UNFUSED, result=UNFUSED)
+@intrinsic(square_root, LANES)
+@intrinsic(square_root, UNFUSED, result=UNFUSED)
 def _square_root(builder: Any, a: Any) -> Any:
-    function = _declared(builder.module, "llvm.sqrt.v8f64", ir.FunctionType(_VECTOR, [_VECTOR]))
+    function = declared(builder.module, "llvm.sqrt.v8f64", ir.FunctionType(LANES_IR, [LANES_IR]))
     return builder.call(function, [a])
 
 
@@ -233,9 +235,9 @@ def times(value: float, a: Point) -> Point:
     return value * a
 
 
-@_compiled(times, types.Float, POINT, result=POINT)
+@intrinsic(times, types.Float, POINT, result=POINT)
 def _times(builder: Any, value: Any, a: Any) -> Any:
-    return builder.fmul(_everywhere(builder, value, _POINT), a, flags=("contract",))
+    return builder.fmul(in_all_lanes(builder, value, POINT_IR), a, flags=("contract",))
 
 
 def point(points: FloatArray, i: int) -> Point:
@@ -243,13 +245,13 @@ def point(points: FloatArray, i: int) -> Point:
     return np.array([*points[i], 0.0])
 
 
-@_compiled(point, types.Array, types.Integer, result=POINT)
-def _load_point(builder: Any, points: _Array, i: Any) -> Any:
-    pointer = builder.bitcast(points.at(i, 3), _POINT.as_pointer())
-    kind = ir.FunctionType(_POINT, [_POINT.as_pointer(), _I32, _XYZ.type, _POINT])
-    function = _declared(builder.module, "llvm.masked.load.v4f64.p0v4f64", kind)
-    zero = ir.Constant(_POINT, [0.0] * 4)
-    return builder.call(function, [pointer, ir.Constant(_I32, 8), _XYZ, zero])
+@intrinsic(point, types.Array, types.Integer, result=POINT)
+def _load_point(builder: Any, points: Operand, i: Any) -> Any:
+    pointer = builder.bitcast(points.at(i, 3), POINT_IR.as_pointer())
+    kind = ir.FunctionType(POINT_IR, [POINT_IR.as_pointer(), I32, _XYZ.type, POINT_IR])
+    function = declared(builder.module, "llvm.masked.load.v4f64.p0v4f64", kind)
+    zero = ir.Constant(POINT_IR, [0.0] * 4)
+    return builder.call(function, [pointer, ir.Constant(I32, 8), _XYZ, zero])
 
 
 def store_point(points: FloatArray, i: int, a: Point) -> None:
@@ -257,14 +259,14 @@ def store_point(points: FloatArray, i: int, a: Point) -> None:
     points[i] = a[:3]
 
 
-@_compiled(store_point, types.Array, types.Integer, POINT, result=types.void)
-def _store_point(builder: Any, points: _Array, i: Any, a: Any) -> None:
+@intrinsic(store_point, types.Array, types.Integer, POINT, result=types.void)
+def _store_point(builder: Any, points: Operand, i: Any, a: Any) -> None:
     # As two stores: one of four lanes with a mask takes 6 ns here, seven times as long.
     pointer = points.at(i, 3)
-    low = _shuffled(builder, a, a, [0, 1])
+    low = shuffled(builder, a, a, [0, 1])
     builder.store(low, builder.bitcast(pointer, low.type.as_pointer()), align=8)
-    last = builder.gep(pointer, [ir.Constant(_I64, 2)])
-    builder.store(builder.extract_element(a, _I32(2)), last)
+    last = builder.gep(pointer, [ir.Constant(I64, 2)])
+    builder.store(builder.extract_element(a, I32(2)), last)
 
 
 def point_of(x: float, y: float, z: float) -> Point:
@@ -272,11 +274,11 @@ def point_of(x: float, y: float, z: float) -> Point:
     return np.array([x, y, z, 0.0])
 
 
-@_compiled(point_of, types.Float, types.Float, types.Float, result=POINT)
+@intrinsic(point_of, types.Float, types.Float, types.Float, result=POINT)
 def _point_of(builder: Any, *coordinates: Any) -> Any:
-    made = ir.Constant(_POINT, [0.0] * 4)
+    made = ir.Constant(POINT_IR, [0.0] * 4)
     for c, value in enumerate(coordinates):
-        made = builder.insert_element(made, value, ir.Constant(_I32, c))
+        made = builder.insert_element(made, value, ir.Constant(I32, c))
     return made
 
 
@@ -285,9 +287,9 @@ def spread(a: Point) -> tuple[Lanes, Lanes, Lanes]:
     return lanes(a[0]), lanes(a[1]), lanes(a[2])
 
 
-@_compiled(spread, POINT, result=_THREE)
+@intrinsic(spread, POINT, result=THREE_LANES)
 def _spread(builder: Any, a: Any) -> Any:
-    return _tuple_of(builder, [_shuffled(builder, a, a, [c] * WIDTH) for c in range(3)])
+    return tuple_of(builder, [shuffled(builder, a, a, [c] * WIDTH) for c in range(3)])
 
 
 def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
@@ -300,33 +302,35 @@ def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lane
     return rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy()
 
 
-@_compiled(eight_points, types.Array, types.Array, types.Integer, result=_THREE)
-def _eight_points(builder: Any, points: _Array, of: _Array, i: Any) -> Any:
+@intrinsic(eight_points, types.Array, types.Array, types.Integer, result=THREE_LANES)
+def _eight_points(builder: Any, points: Operand, of: Operand, i: Any) -> Any:
     rows = []
     for k in range(WIDTH):
         row = points.at(builder.load(of.at(builder.add(i, i.type(k)))), 3)
-        rows.append(builder.load(builder.bitcast(row, _POINT.as_pointer()), align=8))
-    return _tuple_of(builder, _transposed(builder, rows))
+        rows.append(builder.load(builder.bitcast(row, POINT_IR.as_pointer()), align=8))
+    return tuple_of(builder, transposed(builder, rows))
 
 
-def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+def transposed(builder: Any, rows: list[Any]) -> list[Any]:
     """Return x, y and z of eight points."""
-    a, b, c, d = (_shuffled(builder, rows[k], rows[k + 4], range(WIDTH)) for k in range(4))
-    ab, cd = (_shuffled(builder, *pair, _EVEN) for pair in ((a, b), (c, d)))
-    x = _shuffled(builder, ab, cd, _FIRST)
-    z = _shuffled(builder, ab, cd, _SECOND)
-    ab, cd = (_shuffled(builder, *pair, _ODD) for pair in ((a, b), (c, d)))
-    return [x, _shuffled(builder, ab, cd, _FIRST), z]
+    a, b, c, d = (shuffled(builder, rows[k], rows[k + 4], range(WIDTH)) for k in range(4))
+    ab, cd = (shuffled(builder, *pair, EVEN) for pair in ((a, b), (c, d)))
+    x = shuffled(builder, ab, cd, FIRST)
+    z = shuffled(builder, ab, cd, SECOND)
+    ab, cd = (shuffled(builder, *pair, ODD) for pair in ((a, b), (c, d)))
+    return [x, shuffled(builder, ab, cd, FIRST), z]
 
 
-def _tuple_of(builder: Any, values: list[Any]) -> Any:
+def tuple_of(builder: Any, values: list[Any]) -> Any:
+    """Return values of one type as a tuple of a kernel."""
     made = ir.Constant(ir.ArrayType(values[0].type, len(values)), ir.Undefined)
     for i, value in enumerate(values):
         made = builder.insert_value(made, value, i)
     return made
 
 
-def _declared(module: Any, name: str, kind: Any) -> Any:
+def declared(module: Any, name: str, kind: Any) -> Any:
+    """Return the function of LLVM with that name, declared in the module once."""
     known = module.globals.get(name)
     return known if known is not None else ir.Function(module, kind, name)
 
@@ -338,13 +342,13 @@ def summed(x: Lanes, y: Lanes, z: Lanes) -> Point:
     return np.array([*(halves[:, 0] + halves[:, 1]), 0.0])
 
 
-@_compiled(summed, LANES, LANES, LANES, result=POINT)
+@intrinsic(summed, LANES, LANES, LANES, result=POINT)
 def _summed(builder: Any, x: Any, y: Any, z: Any) -> Any:
     def halves(a: Any, b: Any) -> Any:
-        pairs = builder.fadd(_shuffled(builder, a, b, _EVEN), _shuffled(builder, a, b, _ODD))
-        low = _shuffled(builder, pairs, pairs, range(4))
-        return builder.fadd(low, _shuffled(builder, pairs, pairs, range(4, WIDTH)))
+        pairs = builder.fadd(shuffled(builder, a, b, EVEN), shuffled(builder, a, b, ODD))
+        low = shuffled(builder, pairs, pairs, range(4))
+        return builder.fadd(low, shuffled(builder, pairs, pairs, range(4, WIDTH)))
 
-    xy, z0 = halves(x, y), halves(z, ir.Constant(_VECTOR, [0.0] * WIDTH))
-    low = _shuffled(builder, xy, z0, [0, 1, 4, 5])
-    return builder.fadd(low, _shuffled(builder, xy, z0, [2, 3, 6, 7]))
+    xy, z0 = halves(x, y), halves(z, ir.Constant(LANES_IR, [0.0] * WIDTH))
+    low = shuffled(builder, xy, z0, [0, 1, 4, 5])
+    return builder.fadd(low, shuffled(builder, xy, z0, [2, 3, 6, 7]))

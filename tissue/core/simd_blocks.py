@@ -16,26 +16,26 @@ from numba.core import types
 from tissue.core.array_types import FloatArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.simd import (
-    _EVEN,
-    _FIRST,
-    _I32,
-    _I64,
-    _ODD,
-    _POINT,
-    _SECOND,
+    EVEN,
+    FIRST,
+    I32,
+    I64,
     LANES,
     LANES_OF_SINGLES,
+    ODD,
     POINT,
+    POINT_IR,
+    SECOND,
     Lanes,
     LanesType,
+    Operand,
     Point,
-    _Array,
-    _compiled,
-    _everywhere,
-    _shuffled,
-    _tuple_of,
+    in_all_lanes,
+    intrinsic,
+    shuffled,
+    tuple_of,
 )
-from tissue.core.simd_gather import _tree
+from tissue.core.simd_rows import fold_in_pairs
 
 _BOTH = (LANES, LANES_OF_SINGLES)
 _LOW = [x for q in range(0, 16, 4) for x in (q, 16 + q, q + 1, 17 + q)]
@@ -49,7 +49,7 @@ def _kind_of(array: types.Array, *_: types.Type) -> LanesType:
     return LANES_OF_SINGLES if array.dtype == types.float32 else LANES
 
 
-def _vector_of(array: _Array) -> Any:
+def _vector_of(array: Operand) -> Any:
     """Return LLVM's type of the vectors of an array."""
     return ir.VectorType(array.element, 16 if isinstance(array.element, ir.FloatType) else 8)
 
@@ -59,9 +59,9 @@ def width_of(array: FloatArray) -> int:
     return 16 if array.dtype == np.float32 else 8
 
 
-@_compiled(width_of, types.Array, result=types.int64)
-def _width_of(_: Any, array: _Array) -> Any:
-    return ir.Constant(_I64, _vector_of(array).count)
+@intrinsic(width_of, types.Array, result=types.int64)
+def _width_of(_: Any, array: Operand) -> Any:
+    return ir.Constant(I64, _vector_of(array).count)
 
 
 def alike(value: float, a: Lanes) -> Lanes:
@@ -74,8 +74,8 @@ def load_block(array: FloatArray, i: int) -> Lanes:
     return array[i : i + width_of(array)].copy()
 
 
-@_compiled(load_block, types.Array, types.Integer, result=_kind_of)
-def _load_block(builder: Any, array: _Array, i: Any) -> Any:
+@intrinsic(load_block, types.Array, types.Integer, result=_kind_of)
+def _load_block(builder: Any, array: Operand, i: Any) -> Any:
     pointer = builder.bitcast(array.at(i), _vector_of(array).as_pointer())
     return builder.load(pointer, align=_size_of(array.element))
 
@@ -87,24 +87,24 @@ def store_block(array: FloatArray, i: int, values: Lanes) -> None:
 
 def sum_of_lanes(a: Lanes) -> float:
     """Return the sum of the numbers of a vector, neighbours first."""
-    return float(_tree(list(a)))
+    return float(fold_in_pairs(list(a)))
 
 
 for _kind in _BOTH:
 
-    @_compiled(alike, types.Float, _kind, result=_kind)
+    @intrinsic(alike, types.Float, _kind, result=_kind)
     def _alike(builder: Any, value: Any, a: Any) -> Any:
-        return _everywhere(builder, _converted(builder, value, a.type.element), a.type)
+        return in_all_lanes(builder, _converted(builder, value, a.type.element), a.type)
 
-    @_compiled(store_block, types.Array, types.Integer, _kind, result=types.void)
-    def _store_block(builder: Any, array: _Array, i: Any, values: Any) -> None:
+    @intrinsic(store_block, types.Array, types.Integer, _kind, result=types.void)
+    def _store_block(builder: Any, array: Operand, i: Any, values: Any) -> None:
         pointer = builder.bitcast(array.at(i), values.type.as_pointer())
         builder.store(values, pointer, align=_size_of(array.element))
 
-    @_compiled(sum_of_lanes, _kind, result=types.float64)
+    @intrinsic(sum_of_lanes, _kind, result=types.float64)
     def _sum_of_lanes(builder: Any, a: Any) -> Any:
-        terms = [builder.extract_element(a, _I32(k)) for k in range(a.type.count)]
-        return _converted(builder, _tree(terms, builder.fadd), ir.DoubleType())
+        terms = [builder.extract_element(a, I32(k)) for k in range(a.type.count)]
+        return _converted(builder, fold_in_pairs(terms, builder.fadd), ir.DoubleType())
 
 
 def gathered_alike(a: Lanes, values: FloatArray, of: SlotArray, i: int) -> Lanes:
@@ -114,13 +114,13 @@ def gathered_alike(a: Lanes, values: FloatArray, of: SlotArray, i: int) -> Lanes
 
 for _kind in _BOTH:
 
-    @_compiled(gathered_alike, _kind, types.Array, types.Array, types.Integer, result=_kind)
-    def _gathered_alike(builder: Any, a: Any, values: _Array, of: _Array, i: Any) -> Any:
+    @intrinsic(gathered_alike, _kind, types.Array, types.Array, types.Integer, result=_kind)
+    def _gathered_alike(builder: Any, a: Any, values: Operand, of: Operand, i: Any) -> Any:
         made = ir.Constant(a.type, ir.Undefined)
         for lane in range(a.type.count):
             place = builder.load(of.at(builder.add(i, i.type(lane))))
             value = _converted(builder, builder.load(values.at(place)), a.type.element)
-            made = builder.insert_element(made, value, _I32(lane))
+            made = builder.insert_element(made, value, I32(lane))
         return made
 
 
@@ -145,15 +145,15 @@ def store_row(rows: FloatArray, i: int, a: Point) -> None:
     rows[i] = a
 
 
-@_compiled(store_row, types.Array, types.Integer, POINT, result=types.void)
-def _store_row(builder: Any, rows: _Array, i: Any, a: Any) -> None:
+@intrinsic(store_row, types.Array, types.Integer, POINT, result=types.void)
+def _store_row(builder: Any, rows: Operand, i: Any, a: Any) -> None:
     kind = ir.VectorType(rows.element, 4)
-    values = a if kind == _POINT else builder.fptrunc(a, kind)
+    values = a if kind == POINT_IR else builder.fptrunc(a, kind)
     pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
     builder.store(values, pointer, align=4 * _size_of(rows.element))
 
 
-def _row(builder: Any, rows: _Array, i: Any) -> Any:
+def _row(builder: Any, rows: Operand, i: Any) -> Any:
     kind = ir.VectorType(rows.element, 4)
     pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
     return builder.load(pointer, align=4 * _size_of(rows.element))
@@ -164,10 +164,10 @@ def store_everywhere(rows: FloatArray, i: int, value: float) -> None:
     rows[i] = value
 
 
-@_compiled(store_everywhere, types.Array, types.Integer, types.Float, result=types.void)
-def _store_everywhere(builder: Any, rows: _Array, i: Any, value: Any) -> None:
+@intrinsic(store_everywhere, types.Array, types.Integer, types.Float, result=types.void)
+def _store_everywhere(builder: Any, rows: Operand, i: Any, value: Any) -> None:
     kind = ir.VectorType(rows.element, 4)
-    values = _everywhere(builder, _converted(builder, value, rows.element), kind)
+    values = in_all_lanes(builder, _converted(builder, value, rows.element), kind)
     pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
     builder.store(values, pointer, align=4 * _size_of(rows.element))
 
@@ -182,18 +182,18 @@ def values_of_rows(rows: FloatArray, of: SlotArray, i: int) -> Lanes:
     return rows[places, np.arange(len(places)) % 4]
 
 
-@_compiled(values_of_rows, types.Array, types.Array, types.Integer, result=_kind_of)
-def _values_of_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
+@intrinsic(values_of_rows, types.Array, types.Array, types.Integer, result=_kind_of)
+def _values_of_rows(builder: Any, rows: Operand, of: Operand, i: Any) -> Any:
     n = _vector_of(rows).count
     found = [_row(builder, rows, builder.load(of.at(builder.add(i, i.type(k))))) for k in range(n)]
     for lane in range(1, 4):
         order = [4 + c if c == lane else c for c in range(4)]
         for first in range(0, n, 4):
-            found[first] = _shuffled(builder, found[first], found[first + lane], order)
+            found[first] = shuffled(builder, found[first], found[first + lane], order)
     made = found[::4]
     while len(made) > 1:
         made = [
-            _shuffled(builder, a, b, range(2 * a.type.count))
+            shuffled(builder, a, b, range(2 * a.type.count))
             for a, b in zip(made[::2], made[1::2], strict=True)
         ]
     return made[0]
@@ -201,14 +201,14 @@ def _values_of_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
 
 def sum_of_eight_rows(rows: FloatArray, of: SlotArray, i: int) -> Point:
     """Return the sum of rows `of[i]` to `of[i + 7]` of an array of shape (n, 4), in doubles."""
-    return np.asarray(_tree(list(rows[of[i : i + 8]])), dtype=np.float64)
+    return np.asarray(fold_in_pairs(list(rows[of[i : i + 8]])), dtype=np.float64)
 
 
-@_compiled(sum_of_eight_rows, types.Array, types.Array, types.Integer, result=POINT)
-def _sum_of_eight_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
+@intrinsic(sum_of_eight_rows, types.Array, types.Array, types.Integer, result=POINT)
+def _sum_of_eight_rows(builder: Any, rows: Operand, of: Operand, i: Any) -> Any:
     places = [builder.load(of.at(builder.add(i, i.type(k)))) for k in range(8)]
-    total = _tree([_row(builder, rows, place) for place in places], builder.fadd)
-    return total if total.type == _POINT else builder.fpext(total, _POINT)
+    total = fold_in_pairs([_row(builder, rows, place) for place in places], builder.fadd)
+    return total if total.type == POINT_IR else builder.fpext(total, POINT_IR)
 
 
 def points_of_rows(rows: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
@@ -221,29 +221,29 @@ def _three(rows: types.Array, *_: types.Type) -> Any:
     return cast(Any, types).UniTuple(_kind_of(rows), 3)
 
 
-@_compiled(points_of_rows, types.Array, types.Array, types.Integer, result=_three)
-def _points_of_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
-    def shuffled(a: Any, b: Any, order: Any) -> Any:
-        return _shuffled(builder, a, b, order)
+@intrinsic(points_of_rows, types.Array, types.Array, types.Integer, result=_three)
+def _points_of_rows(builder: Any, rows: Operand, of: Operand, i: Any) -> Any:
+    def mixed(a: Any, b: Any, order: Any) -> Any:
+        return shuffled(builder, a, b, order)
 
     n = _vector_of(rows).count
     found = [_row(builder, rows, builder.load(of.at(builder.add(i, i.type(k))))) for k in range(n)]
     if n == 8:
-        a, b, c, d = (shuffled(found[k], found[k + 4], range(8)) for k in range(4))
-        ab, cd = shuffled(a, b, _EVEN), shuffled(c, d, _EVEN)
-        x, z = shuffled(ab, cd, _FIRST), shuffled(ab, cd, _SECOND)
-        y = shuffled(shuffled(a, b, _ODD), shuffled(c, d, _ODD), _FIRST)
-        return _tuple_of(builder, [x, y, z])
+        a, b, c, d = (mixed(found[k], found[k + 4], range(8)) for k in range(4))
+        ab, cd = mixed(a, b, EVEN), mixed(c, d, EVEN)
+        x, z = mixed(ab, cd, FIRST), mixed(ab, cd, SECOND)
+        y = mixed(mixed(a, b, ODD), mixed(c, d, ODD), FIRST)
+        return tuple_of(builder, [x, y, z])
     quarters = []
     for k in range(4):
-        low = shuffled(found[k], found[4 + k], range(8))
-        high = shuffled(found[8 + k], found[12 + k], range(8))
-        quarters.append(shuffled(low, high, range(16)))
+        low = mixed(found[k], found[4 + k], range(8))
+        high = mixed(found[8 + k], found[12 + k], range(8))
+        quarters.append(mixed(low, high, range(16)))
     a, b, c, d = quarters
-    ab, cd = shuffled(a, b, _LOW), shuffled(c, d, _LOW)
-    x, y = shuffled(ab, cd, _FORMER), shuffled(ab, cd, _LATTER)
-    z = shuffled(shuffled(a, b, _HIGH), shuffled(c, d, _HIGH), _FORMER)
-    return _tuple_of(builder, [x, y, z])
+    ab, cd = mixed(a, b, _LOW), mixed(c, d, _LOW)
+    x, y = mixed(ab, cd, _FORMER), mixed(ab, cd, _LATTER)
+    z = mixed(mixed(a, b, _HIGH), mixed(c, d, _HIGH), _FORMER)
+    return tuple_of(builder, [x, y, z])
 
 
 @kernel
@@ -270,11 +270,11 @@ def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
 
 for _kind in _BOTH:
 
-    @_compiled(store_rows, types.Array, types.Integer, _kind, _kind, _kind, result=types.void)
-    def _store_rows(builder: Any, rows: _Array, i: Any, x: Any, y: Any, z: Any) -> None:
+    @intrinsic(store_rows, types.Array, types.Integer, _kind, _kind, _kind, result=types.void)
+    def _store_rows(builder: Any, rows: Operand, i: Any, x: Any, y: Any, z: Any) -> None:
         n = x.type.count
-        first, second = (_EVEN, _ODD) if n == 8 else (_LOW, _HIGH)
-        low, high = _shuffled(builder, x, y, first), _shuffled(builder, x, y, second)
+        first, second = (EVEN, ODD) if n == 8 else (_LOW, _HIGH)
+        low, high = shuffled(builder, x, y, first), shuffled(builder, x, y, second)
         for k in range(4):
             # x and y of lane k of each four are in `xy`, at `at`.
             if n == 8:
@@ -284,32 +284,75 @@ for _kind in _BOTH:
             order = [c for q in range(0, n, 4) for c in (q + at, q + at + 1, n + q + k, n + q + k)]
             place = rows.at(builder.add(i, i.type(k * n // 4)), 4)
             pointer = builder.bitcast(place, x.type.as_pointer())
-            values = _shuffled(builder, xy, z, order)
+            values = shuffled(builder, xy, z, order)
             builder.store(values, pointer, align=4 * _size_of(rows.element))
 
 
-# functions of `tissue.core.simd` for singles
+_N_TERMS_DOUBLE, _N_TERMS_SINGLE = 11, 5
+"""Terms of the series, as many as change the last bit."""
+
+_SQRT_HALF_DOUBLE, _SQRT_HALF_SINGLE = 0x3FE6A09E667F3BCD, 0x3F3504F3
+"""The bits of sqrt(1/2)."""
+
+_MANTISSA_DOUBLE, _MANTISSA_SINGLE = 52, 23
+"""Bits of a mantissa."""
 
 
-def _register_singles() -> None:
-    from tissue.core import simd_gather
+def logarithm(a: Lanes) -> Lanes:
+    """Return the natural logarithms of positive numbers that are not subnormal.
 
-    kind = LANES_OF_SINGLES
-
-    _compiled(simd_gather.larger, kind, kind, result=kind)(simd_gather._larger)
-    _compiled(simd_gather.any_above, kind, kind, result=types.boolean)(simd_gather._any_above)
-    _compiled(simd_gather.where_larger, kind, kind, kind, kind, result=kind)(
-        simd_gather._where_larger
-    )
-
-    @_compiled(simd_gather.largest, kind, result=types.float64)
-    def _largest(builder: Any, a: Any) -> Any:
-        values = [builder.extract_element(a, _I32(k)) for k in range(16)]
-
-        def fold(b: Any, c: Any) -> Any:
-            return builder.select(builder.fcmp_ordered(">", b, c), b, c)
-
-        return builder.fpext(_tree(values, fold), ir.DoubleType())
+    In a kernel that of a number that is not finite is nan.
+    """
+    return np.log(a)
 
 
-_register_singles()
+def _series(builder: Any, a: Any, bits: Any, sqrt_half: int, mantissa: int, n_terms: int) -> Any:
+    """Return log a.
+
+    Args:
+        builder: Builds the code.
+        a: A vector.
+        bits: Type of the bits of one of its numbers.
+        sqrt_half: The bits of sqrt(1/2).
+        mantissa: Bits of a mantissa.
+        n_terms: Terms of the series.
+    """
+    n = a.type.count
+    words = ir.VectorType(bits, n)
+
+    def all_of(value: float) -> Any:
+        return ir.Constant(a.type, [value] * n)
+
+    def whole(value: int) -> Any:
+        return ir.Constant(words, [value] * n)
+
+    def fused(x: Any, y: Any, z: Any) -> Any:
+        product = builder.fmul(x, y, flags=("contract",))
+        return builder.fadd(product, z, flags=("contract",))
+
+    raw = builder.bitcast(a, words)
+    exponent = builder.ashr(builder.sub(raw, whole(sqrt_half)), whole(mantissa))
+    m = builder.bitcast(builder.sub(raw, builder.shl(exponent, whole(mantissa))), a.type)
+    s = builder.fdiv(builder.fsub(m, all_of(1.0)), builder.fadd(m, all_of(1.0)))
+    z = builder.fmul(s, s)
+    total = all_of(2.0 / (2 * n_terms + 1))
+    for k in range(n_terms - 1, 0, -1):
+        total = fused(total, z, all_of(2.0 / (2 * k + 1)))
+    twice = builder.fadd(s, s)
+    of_m = fused(builder.fmul(total, z), s, twice)
+    e = builder.sitofp(exponent, a.type)
+    found = fused(e, all_of(float(np.log(2.0))), of_m)
+    # a - a is 0 for finite numbers, and nan for others.
+    return builder.fadd(found, builder.fsub(a, a))
+
+
+@intrinsic(logarithm, LANES)
+def _of_doubles(builder: Any, a: Any) -> Any:
+    kind = ir.IntType(64)
+    return _series(builder, a, kind, _SQRT_HALF_DOUBLE, _MANTISSA_DOUBLE, _N_TERMS_DOUBLE)
+
+
+@intrinsic(logarithm, LANES_OF_SINGLES, result=LANES_OF_SINGLES)
+def _of_singles(builder: Any, a: Any) -> Any:
+    kind = ir.IntType(32)
+    return _series(builder, a, kind, _SQRT_HALF_SINGLE, _MANTISSA_SINGLE, _N_TERMS_SINGLE)

@@ -228,7 +228,7 @@ class Vectors(Arrays):
         self.address = self._memory.buffer_info()[0]
 
     def __getattr__(self, name: str) -> Vec3:
-        """Return a vector, which is made when it is asked for first."""
+        """Return a vector, which is made on first use."""
         if name not in self._names:
             raise AttributeError(f"{type(self).__name__} has no {name}")
         first = 3 * self._names.index(name)

@@ -6,27 +6,36 @@ in its cache what it wrote in the loop before. The first thread waits for no one
 that the operating system does not run costs nothing, unless it is stopped inside a chunk.
 
 A loop must give the same bits in any chunks: each item is written by its own turn alone.
+
+The operations on shared numbers are atomic and sequentially consistent: what a thread wrote before
+one of them, another thread sees after it has read the number. With the JIT off they are plain
+Python functions, for one thread.
 """
 
+import os
+import platform
+from typing import Any
+
+from llvmlite import ir
+from numba.core import types
+
 from tissue.core.array_types import IntArray
-from tissue.core.atomics import (
-    add_shared,
-    load_shared,
-    pause,
-    replace_shared,
-    store_shared,
-    yield_core,
-)
 from tissue.core.jit import kernel
-from tissue.core.simd import aligned
+from tissue.core.simd import I32, Operand, aligned, declared, intrinsic
 from tissue.core.structs import Arrays, FloatCell, IntCell
+
+_ORDER = "seq_cst"
+
+_BYTES = 8
+
+_NUMBERS = types.Array(types.int64, 1, "C")
 
 LOOP_CHUNKS = 256
 """Chunks in a loop at most. More: longer claims; fewer: the first thread waits longer at the end.
 Less than `_ONE_FIRST`."""
 
 SPINS_BEFORE_YIELD = 400
-"""Times that the first thread looks, some 20 us, before it lets others run on its core. More: where
+"""Tests by the first thread, some 20 us, before it lets others run on its core. More: where
 there is one core alone, it waits for a thread that cannot run; fewer: it may lose its core."""
 
 _OPEN, _DONE, _N_SHARED = 0, 16, 32
@@ -68,7 +77,7 @@ def new_team() -> Team:
 
 @kernel
 def open_loop(team: Team, loop: int, seconds: float, n: int, chunk_size: int) -> int:
-    """Let threads claim the chunks of a loop; return how many there are.
+    """Open a loop, whose chunks threads claim; return how many there are.
 
     Args:
         team: Written; the loop before has ended.
@@ -122,7 +131,7 @@ def items_of(team: Team, chunk: int) -> tuple[int, int]:
 
 @kernel
 def end_chunk(team: Team) -> None:
-    """Say that a chunk is done that was claimed by another than the first thread."""
+    """Count a chunk as done that was claimed by another than the first thread."""
     add_shared(team.numbers, _DONE, 1)
 
 
@@ -136,3 +145,75 @@ def wait_for_others(team: Team, n: int) -> None:
             pause()
         else:
             yield_core()
+
+
+def load_shared(numbers: IntArray, i: int) -> int:
+    """Return element `i` of a vector."""
+    return int(numbers[i])
+
+
+@intrinsic(load_shared, _NUMBERS, types.Integer, result=types.int64)
+def _load(builder: Any, numbers: Operand, i: Any) -> Any:
+    return builder.load_atomic(numbers.at(i), _ORDER, _BYTES)
+
+
+def store_shared(numbers: IntArray, i: int, value: int) -> None:
+    """Write element `i` of a vector."""
+    numbers[i] = value
+
+
+@intrinsic(store_shared, _NUMBERS, types.Integer, types.Integer, result=types.void)
+def _store(builder: Any, numbers: Operand, i: Any, value: Any) -> None:
+    builder.store_atomic(value, numbers.at(i), _ORDER, _BYTES)
+
+
+def add_shared(numbers: IntArray, i: int, value: int) -> None:
+    """Add to element `i` of a vector."""
+    numbers[i] += value
+
+
+@intrinsic(add_shared, _NUMBERS, types.Integer, types.Integer, result=types.void)
+def _add(builder: Any, numbers: Operand, i: Any, value: Any) -> None:
+    builder.atomic_rmw("add", numbers.at(i), value, _ORDER)
+
+
+def replace_shared(numbers: IntArray, i: int, expected: int, value: int) -> bool:
+    """Write element `i` of a vector if it is what is expected; return whether it was."""
+    if numbers[i] != expected:
+        return False
+    numbers[i] = value
+    return True
+
+
+@intrinsic(
+    replace_shared, _NUMBERS, types.Integer, types.Integer, types.Integer, result=types.boolean
+)
+def _replace(builder: Any, numbers: Operand, i: Any, expected: Any, value: Any) -> Any:
+    found = builder.cmpxchg(numbers.at(i), expected, value, _ORDER, _ORDER)
+    return builder.extract_value(found, 1)
+
+
+def pause() -> None:
+    """Pause the core for some tens of nanoseconds, in a loop that waits."""
+
+
+@intrinsic(pause, result=types.void)
+def _pause(builder: Any) -> None:
+    machine = platform.machine().lower()
+    if machine in ("x86_64", "amd64"):
+        kind = ir.FunctionType(ir.VoidType(), [])
+        builder.call(declared(builder.module, "llvm.x86.sse2.pause", kind), [])
+    elif machine in ("arm64", "aarch64"):
+        kind = ir.FunctionType(ir.VoidType(), [I32])
+        hint = declared(builder.module, "llvm.aarch64.hint", kind)
+        builder.call(hint, [I32(1)])  # the instruction `yield`
+
+
+def yield_core() -> None:
+    """Yield this core to another thread; without POSIX, do nothing."""
+
+
+@intrinsic(yield_core, result=types.void)
+def _yield_core(builder: Any) -> None:
+    if os.name == "posix":
+        builder.call(declared(builder.module, "sched_yield", ir.FunctionType(I32, [])), [])

@@ -34,7 +34,7 @@ class BladeSegment(NamedTuple):
 
     @staticmethod
     def of_numbers(numbers: Nine) -> "BladeSegment":
-        """Return a segment of such numbers; its arrays are made when they are asked for."""
+        """Return a segment of such numbers; its arrays are made on first use."""
         return _of_numbers(_LazySegment, numbers)
 
 
@@ -75,7 +75,7 @@ class Wrench(NamedTuple):
 
     @staticmethod
     def of_numbers(numbers: Nine) -> "Wrench":
-        """Return a wrench of such numbers; its arrays are made when they are asked for."""
+        """Return a wrench of such numbers; its arrays are made on first use."""
         return _of_numbers(_LazyWrench, numbers)
 
 

@@ -2,19 +2,16 @@
 
 In the order in which they are best read:
 
-    incision               from the first contact of the blade to the last: detect, cut, open, end
-    scheme                 what any scheme of cutting does, in the stages of the paper's Table 1
+    incision               from the first contact of the blade to the last; the scheme
     blade_path             the path of the cutting edge through the material in one step
     collision_detection    CD: the active tetrahedra, and the edges that the blade crossed
-    cut_surface            the sheet that the blade leaves behind, and the two sides of it
+    cut_surface            the cut surface that the blade leaves behind, and the two sides of it
     workspace              all that a cut step reads and writes
     snapping               use a node that is there for a crossing, or insert one
     stellar_subdivision    split the tetrahedra around an edge or a face
     crack_front            the edges of the mesh along which the cut ends
     bridging               tetrahedra that still bridge the cut behind the blade
-    separation             cut the faces on the sheet and double their nodes
-    cut_pass               the files above in one pass
-    scheme_choice          the scheme that a user chose
+    separation             cut the faces on the cut surface and double their nodes
     stellar_scheme         our scheme, made of the files above
     bielser_1998           the scheme of Bielser, Maiwald and Gross
 """

@@ -15,8 +15,8 @@ LEAST_ALIGNMENT = 0.7
 """Cosine of the angle between the normal of the path and that of the blade's flat; below it the
 blade's is used."""
 
-LEAST_WAY = 0.5
-"""Length of `Path.way`, at least, where it says which way an end of the edge went."""
+LEAST_DIRECTION = 0.5
+"""Length of `Path.direction`, at least, where it shows the motion of an end of the edge."""
 
 _FARTHEST = 1 << 62
 """Steps of the lattice beyond any of its points."""
@@ -37,7 +37,7 @@ class Path(Arrays):
     """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
     sideways: FloatArray
     """Unit normal of the blade's flat, in the body at rest: the side +1; shape (n, 3)."""
-    way: FloatArray
+    direction: FloatArray
     """Direction in which the tip and the heel went last, averaged over a node size, shape (2, 3).
     It is shorter than 1 at first, and where the direction changes; 0 outside the tissue."""
     seed: IntArray
@@ -48,7 +48,7 @@ class Path(Arrays):
     """Whether each sample was part of the chain in the step before, so that its `t1` is where it
     was then; shape (n,)."""
     linked: BoolArray
-    """Whether each sample and the next one span a piece of the sheet, shape (n,)."""
+    """Whether each sample and the next one span a piece of the cut surface, shape (n,)."""
     has_left: IntCell
     """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
     has_end_in: IntCell
@@ -70,7 +70,7 @@ def new_path(n: int) -> Path:
         lattice_t1=np.zeros((n, 3), np.int64),
         forward=np.zeros((n, 3)),
         sideways=np.zeros((n, 3)),
-        way=np.zeros((2, 3)),
+        direction=np.zeros((2, 3)),
         seed=np.full(n, -1, np.int64),
         member=np.zeros(n, np.bool_),
         known=np.zeros(n, np.bool_),
@@ -83,7 +83,7 @@ def new_path(n: int) -> Path:
 
 
 class Plane(NamedTuple):
-    """The plane of the sheet near a point."""
+    """The plane of the cut surface near a point."""
 
     point: Vec3
     """A point in the plane, in the body at rest [m]."""
@@ -93,7 +93,7 @@ class Plane(NamedTuple):
 
 @kernel
 def plane_at(path: Path, k: int, p: Vec3) -> Plane:
-    """Return the plane of the sheet at the point of segment `k` of the edge nearest to `p` [m]."""
+    """Return the plane of the cut at the point of segment `k` of the edge nearest to `p` [m]."""
     tip = vec3(path.t1, k)
     along = sub(vec3(path.t1, k + 1), tip)
     normal = normalised(cross(vec3(path.forward, k), along))
@@ -137,11 +137,11 @@ def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
 def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
     """Return whether a point of the body at rest is where the edge has not been.
 
-    It is ahead of where the edge is at the end of the step, or beyond the way of tip or heel.
+    It is ahead of where the edge is at the end of the step, or beyond the path of tip or heel.
 
     Args:
         path: Path of the edge.
-        p: The point, on the sheet or near it [m].
+        p: The point, on the cut surface or near it [m].
         margin: Distance by which it is so at least [m].
     """
     k = nearest_on_edge(path, p).segment
@@ -163,33 +163,34 @@ def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
 
 @kernel
 def _is_beyond_end(path: Path, end: int, sample: int, p: Vec3, margin: float) -> bool:
-    """Return whether a point is beyond the way of the tip, `end` 0, or of the heel, `end` 1."""
-    outwards = cross(vec3(path.way, end), vec3(path.sideways, sample))
+    """Return whether a point is beyond the path of the tip, `end` 0, or of the heel, `end` 1."""
+    outwards = cross(vec3(path.direction, end), vec3(path.sideways, sample))
     if end == 1:
         outwards = scale(-1.0, outwards)
     size = norm(outwards)
-    return size > LEAST_WAY and dot(sub(p, vec3(path.t1, sample)), outwards) > margin * size
+    return size > LEAST_DIRECTION and dot(sub(p, vec3(path.t1, sample)), outwards) > margin * size
 
 
 @kernel
-def note_way(path: Path, over: float) -> None:
+def average_directions(path: Path, over: float) -> None:
     """Average the directions in which tip and heel go, over a distance `over` [m]."""
     for end in range(2):
         sample = 0 if end == 0 else len(path.member) - 1
-        way = vec3(path.way, end)
+        direction = vec3(path.direction, end)
         if not path.member[sample]:
-            store(path.way, end, scale(0.0, way))
+            store(path.direction, end, scale(0.0, direction))
             continue
         step = sub(vec3(path.t1, sample), vec3(path.t0, sample))
         distance = norm(step)
         if distance > 0.0:
             share = min(distance / over, 1.0)
-            store(path.way, end, axpy(share, sub(scale(1.0 / distance, step), way), way))
+            turn = sub(scale(1.0 / distance, step), direction)
+            store(path.direction, end, axpy(share, turn, direction))
 
 
 @kernel
 def plane_near(path: Path, p: Vec3) -> Plane:
-    """Return the plane of the sheet at the point of the edge that is nearest to `p` [m].
+    """Return the plane of the cut surface at the point of the edge that is nearest to `p` [m].
 
     Its normal is zero where the edge spans nothing.
     """

@@ -1,15 +1,16 @@
-"""Tetrahedra that bridge the cut: behind the blade, with nodes on both sides of the sheet.
+"""Tetrahedra that bridge the cut: behind the blade, with nodes on both sides of the cut surface.
 
-Every edge that the blade crosses gets a node on the sheet. An edge between the two sides can only
-remain where the sheet turns within an element, so that a node was on one side of it at first and on
-the other later. Such edges are found when a tetrahedron leaves the list of active ones, and cut.
-An edge of the mesh ahead of the sheet, or beyond the way of its ends, is no bridge.
+Every edge that the blade crosses gets a node on the cut surface. An edge between the two sides can
+only remain where the cut surface turns within an element, so that a node was on one side of it at
+first and on the other later. Such edges are found when a tetrahedron leaves the list of active
+ones, and cut. An edge of the mesh ahead of the cut surface, or beyond the path of its ends, is no
+bridge.
 """
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, lerp, sub, vec3
 from tissue.cutting.blade_path import Path, Plane, is_unswept, nearest_on_edge, plane_at
-from tissue.cutting.cut_surface import note_side, on_sheet, side_of
+from tissue.cutting.cut_surface import note_side, on_cut_surface, side_of
 from tissue.cutting.snapping import insert_crossing, snap_distance
 from tissue.cutting.workspace import Cut, flag
 from tissue.mesh.changes import LISTS
@@ -58,14 +59,14 @@ def remember_active(cut: Cut) -> None:
 
 @kernel
 def _resolve(cut: Cut, t: int) -> None:
-    body, sheet = cut.body, cut.sheet
+    body, surface = cut.body, cut.surface
     for p in range(3):
         for q in range(p + 1, 4):
             a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
             b = max(body.tetrahedra[t, p], body.tetrahedra[t, q])
-            if on_sheet(sheet, a) or on_sheet(sheet, b):
+            if on_cut_surface(surface, a) or on_cut_surface(surface, b):
                 continue
-            if side_of(sheet, a) * side_of(sheet, b) < 0:
+            if side_of(surface, a) * side_of(surface, b) < 0:
                 _resolve_edge(cut, a, b)
                 return
 
@@ -73,7 +74,7 @@ def _resolve(cut: Cut, t: int) -> None:
 @kernel
 def _resolve_edge(cut: Cut, a: int, b: int) -> None:
     """Cut an edge between the two sides, or correct the side of a node far from the blade."""
-    body, sheet = cut.body, cut.sheet
+    body, surface = cut.body, cut.surface
     pa = vec3(body.rest, a)
     pb = vec3(body.rest, b)
     segment = _nearest_segment(cut.path, lerp(0.5, pa, pb))
@@ -87,12 +88,12 @@ def _resolve_edge(cut: Cut, a: int, b: int) -> None:
             insert_crossing(cut, a, b, segment, t)
         return
     side = 1 if height_a + height_b >= 0.0 else -1
-    wrong = a if side_of(sheet, a) != side else b
+    wrong = a if side_of(surface, a) != side else b
     height = abs(height_a) if wrong == a else abs(height_b)
     if height < snap_distance(cut, wrong):
         flag(cut, wrong)
     else:
-        note_side(sheet, wrong, side, True)
+        note_side(surface, wrong, side, True)
 
 
 @kernel

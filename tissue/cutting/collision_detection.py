@@ -14,10 +14,10 @@ from tissue.core.hash_table import (
     is_filled,
 )
 from tissue.core.jit import kernel
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.cutting.blade_path import Path, put_on_lattice
-from tissue.cutting.cut_surface import on_sheet
+from tissue.cutting.cut_surface import on_cut_surface
 from tissue.cutting.workspace import Cut
 from tissue.geometry.aabb import Aabb, overlap, segment_box, tetrahedron_box
 from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
@@ -81,13 +81,13 @@ def _visit(cut: Cut, t: int, epoch: int, is_seed: bool) -> None:
 def _visit_other_lip(cut: Cut, t: int, f: int, epoch: int) -> None:
     """Visit the tetrahedra that touched cut face `f` of `t` from the other side.
 
-    They are the stars of the twins of its nodes. Twins on the current sheet are skipped: ahead of
-    the blade the lips of the current incision are still connected.
+    They are the stars of the twins of its nodes. Twins on the current cut surface are skipped:
+    ahead of the blade the lips of the current incision are still connected.
     """
     body, visits = cut.body, cut.visits
     for k in range(4):
         node = body.tetrahedra[t, k]
-        if k == f or visits.nodes[node] == epoch or on_sheet(cut.sheet, node):
+        if k == f or visits.nodes[node] == epoch or on_cut_surface(cut.surface, node):
             continue
         visits.nodes[node] = epoch
         twin = body.twin[node]
@@ -127,7 +127,7 @@ def _visit_star(cut: Cut, node: int, epoch: int) -> None:
 
 @kernel
 def _note_segments(cut: Cut, t: int, n: int) -> bool:
-    """Note which segments' boxes overlap that of tetrahedron `t`; return whether any does."""
+    """List the segments whose boxes overlap that of tetrahedron `t`; return whether any does."""
     body, path, segments = cut.body, cut.path, cut.scratch.segments
     box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)
     last = len(path.linked) - 1
@@ -227,7 +227,7 @@ def _add_tested(tested: HashTable, mask: int, a: int, b: int) -> bool:
 
 @kernel
 def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
-    """Note where one of segments `first` to `last`, swept, crosses edge ab."""
+    """Store where one of segments `first` to `last`, swept, crosses edge ab."""
     body, path, scratch = cut.body, cut.path, cut.scratch
     box = segment_box(body.lattice_rest, a, b)
     near = segments_near(path, box, first, last + 1)

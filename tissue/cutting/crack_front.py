@@ -1,7 +1,8 @@
 """The crack front: the path of an end of the blade through the tissue, as edges of the mesh.
 
 Where the tip passes through a face, a node is inserted, and successive nodes are joined by edges.
-Without them the sheet inside a tetrahedron that the tip passed through need not be a union of mesh
+Without them the cut surface inside a tetrahedron that the tip passed through need not be a union of
+mesh
 faces: it failed for 20 to 50 % of the orders of insertion, and with them for none of 35,580.
 """
 
@@ -64,7 +65,7 @@ class LineSegment(NamedTuple):
 @kernel
 def extend_fronts(cut: Cut) -> None:
     """Extend the crack front at the tip and at the heel by their paths in this step."""
-    path, front = cut.path, cut.sheet.front
+    path, front = cut.path, cut.surface.front
     last = len(path.seed) - 1
     for end in range(2):
         sample = 0 if end == 0 else last
@@ -93,7 +94,7 @@ def bring_front_to_blade(cut: Cut) -> None:
     Otherwise the cut opens up to the last faces that the edge has left behind, up to an element
     short. That matters only while the edge rests, and every front adds nodes.
     """
-    path, front = cut.path, cut.sheet.front
+    path, front = cut.path, cut.surface.front
     last = len(path.seed) - 1
     node = front[0] if path.member[0] else -1
     for k in range(last):

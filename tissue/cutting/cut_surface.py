@@ -1,4 +1,4 @@
-"""The sheet: the surface that the blade leaves behind in the current incision, and its two sides.
+"""The surface that the blade leaves behind in the current incision, and its two sides.
 
 It is a surface in the body at rest, where cracks are closed, tetrahedra are never inverted and
 nothing moves: the anchors of the edge move along material points.
@@ -12,34 +12,35 @@ from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import grown
 
 
-class CutSheet(Arrays):
-    """The sheet of the current incision. Entries are valid only where stamped with its number."""
+class CutSurface(Arrays):
+    """The surface of the current incision. Entries are valid where stamped with its number."""
 
     number: IntCell
     """Number of the incision, from 1."""
     node_stamp: IntArray
     """Incision in which each node's entries were written, shape (node capacity,)."""
     offset: FloatArray
-    """Distance of an on-sheet node from the true sheet [m], -1 for others; (node capacity,)."""
+    """Distance of an on-surface node from the true surface [m], -1 for others; (node capacity,)."""
     past_offset: FloatArray
-    """Largest offset that a node had on earlier sheets [m], -1 if none; (node capacity,)."""
+    """Largest offset that a node had on earlier cut surfaces [m], -1 if none; (node capacity,)."""
     side: IntArray
-    """Side of the sheet that a node was found on, +1 or -1, 0 if unknown; (node capacity,)."""
+    """Side of the cut surface that a node was found on, +1 or -1, 0 if unknown; (node
+    capacity,)."""
     nodes: IntArray
-    """The nodes on the sheet, in the order in which they came, shape (node capacity,)."""
+    """The nodes on the cut surface, in the order in which they came, shape (node capacity,)."""
     n_nodes: IntCell
-    """Number of nodes on the sheet."""
+    """Number of nodes on the cut surface."""
     tetrahedron_stamp: IntArray
     """Incision in which each tetrahedron's side was decided, shape (tetrahedron capacity,)."""
     tetrahedron_side: IntArray
-    """Side of the sheet that a tetrahedron is on, 0 if undecided; (tetrahedron capacity,)."""
+    """Side of the cut surface that a tetrahedron is on, 0 if undecided; (tetrahedron capacity,)."""
     front: IntArray
     """Last node of the crack front at the tip and at the heel, or -1; shape (2,)."""
 
 
-def new_sheet(n_nodes: int, n_tetrahedra: int) -> CutSheet:
-    """Return a sheet with nothing on it."""
-    return CutSheet(
+def new_cut_surface(n_nodes: int, n_tetrahedra: int) -> CutSurface:
+    """Return a cut surface with nothing on it."""
+    return CutSurface(
         number=1,
         node_stamp=np.zeros(n_nodes, np.int64),
         offset=np.full(n_nodes, -1.0),
@@ -53,91 +54,91 @@ def new_sheet(n_nodes: int, n_tetrahedra: int) -> CutSheet:
     )
 
 
-def grown_sheet(sheet: CutSheet, n_nodes: int, n_tetrahedra: int) -> CutSheet:
-    """Return the sheet with room for that many nodes and tetrahedra."""
-    return sheet.replaced(
-        node_stamp=grown(sheet.node_stamp, n_nodes),
-        offset=grown(sheet.offset, n_nodes, -1.0),
-        past_offset=grown(sheet.past_offset, n_nodes, -1.0),
-        side=grown(sheet.side, n_nodes),
-        nodes=grown(sheet.nodes, n_nodes),
-        tetrahedron_stamp=grown(sheet.tetrahedron_stamp, n_tetrahedra),
-        tetrahedron_side=grown(sheet.tetrahedron_side, n_tetrahedra),
+def grown_cut_surface(surface: CutSurface, n_nodes: int, n_tetrahedra: int) -> CutSurface:
+    """Return the cut surface with room for that many nodes and tetrahedra."""
+    return surface.replaced(
+        node_stamp=grown(surface.node_stamp, n_nodes),
+        offset=grown(surface.offset, n_nodes, -1.0),
+        past_offset=grown(surface.past_offset, n_nodes, -1.0),
+        side=grown(surface.side, n_nodes),
+        nodes=grown(surface.nodes, n_nodes),
+        tetrahedron_stamp=grown(surface.tetrahedron_stamp, n_tetrahedra),
+        tetrahedron_side=grown(surface.tetrahedron_side, n_tetrahedra),
     )
 
 
 @kernel
-def begin_sheet(sheet: CutSheet) -> None:
+def begin_cut_surface(surface: CutSurface) -> None:
     """Forget the last incision and begin another."""
-    sheet.number += 1
-    sheet.n_nodes = 0
-    sheet.front[0] = -1
-    sheet.front[1] = -1
+    surface.number += 1
+    surface.n_nodes = 0
+    surface.front[0] = -1
+    surface.front[1] = -1
 
 
 @kernel
-def touch(sheet: CutSheet, node: int) -> None:
+def touch(surface: CutSurface, node: int) -> None:
     """Reset the entries of `node` unless they belong to the current incision."""
-    if sheet.node_stamp[node] != sheet.number:
-        sheet.node_stamp[node] = sheet.number
-        sheet.past_offset[node] = max(sheet.past_offset[node], sheet.offset[node])
-        sheet.offset[node] = -1.0
-        sheet.side[node] = 0
+    if surface.node_stamp[node] != surface.number:
+        surface.node_stamp[node] = surface.number
+        surface.past_offset[node] = max(surface.past_offset[node], surface.offset[node])
+        surface.offset[node] = -1.0
+        surface.side[node] = 0
 
 
 @kernel
-def on_sheet(sheet: CutSheet, node: int) -> bool:
-    """Return whether `node` lies on the sheet of the current incision."""
-    is_on: bool = sheet.node_stamp[node] == sheet.number and sheet.offset[node] >= 0.0
+def on_cut_surface(surface: CutSurface, node: int) -> bool:
+    """Return whether `node` lies on the cut surface of the current incision."""
+    is_on: bool = surface.node_stamp[node] == surface.number and surface.offset[node] >= 0.0
     return is_on
 
 
 @kernel
-def past_offset(sheet: CutSheet, node: int) -> float:
-    """Return the largest distance of `node` from an earlier sheet that it lies on [m], or -1."""
-    offset: float = sheet.past_offset[node]
-    if sheet.node_stamp[node] != sheet.number:
-        offset = max(sheet.past_offset[node], sheet.offset[node])
+def past_offset(surface: CutSurface, node: int) -> float:
+    """Return the largest distance of `node` from an earlier surface that it lies on [m], or -1."""
+    offset: float = surface.past_offset[node]
+    if surface.node_stamp[node] != surface.number:
+        offset = max(surface.past_offset[node], surface.offset[node])
     return offset
 
 
 @kernel
-def side_of(sheet: CutSheet, node: int) -> int:
+def side_of(surface: CutSurface, node: int) -> int:
     """Return the side that `node` was found on in this incision, or 0."""
-    if sheet.node_stamp[node] != sheet.number:
+    if surface.node_stamp[node] != surface.number:
         return 0
-    side: int = sheet.side[node]
+    side: int = surface.side[node]
     return side
 
 
 @kernel
-def note_side(sheet: CutSheet, node: int, side: int, again: bool) -> None:
-    """Note the side that `node` was found on; with `again` also where one is noted already."""
-    touch(sheet, node)
-    if again or sheet.side[node] == 0:
-        sheet.side[node] = side
+def note_side(surface: CutSurface, node: int, side: int, again: bool) -> None:
+    """Store the side that `node` was found on; with `again` also where one is stored already."""
+    touch(surface, node)
+    if again or surface.side[node] == 0:
+        surface.side[node] = side
 
 
 @kernel
-def decided_side(sheet: CutSheet, t: int) -> int:
+def decided_side(surface: CutSurface, t: int) -> int:
     """Return the side decided for tetrahedron `t` in this incision, or 0."""
-    if sheet.tetrahedron_stamp[t] != sheet.number:
+    if surface.tetrahedron_stamp[t] != surface.number:
         return 0
-    side: int = sheet.tetrahedron_side[t]
+    side: int = surface.tetrahedron_side[t]
     return side
 
 
 @kernel
-def decide_side(sheet: CutSheet, t: int, side: int) -> None:
+def decide_side(surface: CutSurface, t: int, side: int) -> None:
     """Decide that tetrahedron `t` is on that side."""
-    sheet.tetrahedron_stamp[t] = sheet.number
-    sheet.tetrahedron_side[t] = side
+    surface.tetrahedron_stamp[t] = surface.number
+    surface.tetrahedron_side[t] = side
 
 
 @kernel
-def put_on_sheet(sheet: CutSheet, node: int, offset: float) -> None:
-    """Put `node` on the sheet; `offset` is its distance from the true sheet [m]."""
-    touch(sheet, node)
-    sheet.offset[node] = offset
-    sheet.nodes[sheet.n_nodes] = node
-    sheet.n_nodes += 1
+def put_on_cut_surface(surface: CutSurface, node: int, offset: float) -> None:
+    """Put `node` on the cut surface; `offset` is its distance from the true surface [m]."""
+    touch(surface, node)
+    surface.offset[node] = offset
+    surface.nodes[surface.n_nodes] = node
+    surface.n_nodes += 1

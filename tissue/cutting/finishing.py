@@ -1,14 +1,15 @@
 """Finishing: where an incision ends, the small bridges that the blade passed over are parted.
 
 The path of the edge is known at its samples only, and ends at the last one that held tissue. At the
-ends of the sheet, and between two parts of it, tissue of less than an element can stay whole. The
-faces that part it are those of the minimum cut between the two lips (`tissue.cutting.minimum_cut`).
-They are cut where their area is a small share of the sheet. Where it is not, the blade left a
-bridge that is to stay. No blade pays for the work of these cuts: their area is reported by itself.
+ends of the cut surface, and between two parts of it, tissue of less than an element can stay whole.
+The faces that part it are those of the minimum cut between the two lips
+(`tissue.cutting.minimum_cut`). They are cut where their area is a small share of the cut surface.
+Where it is not, the blade left a bridge that is to stay. No blade pays for the work of these cuts:
+their area is reported by itself.
 """
 
 from tissue.core.jit import kernel
-from tissue.cutting.cut_surface import decide_side, decided_side, on_sheet, past_offset
+from tissue.cutting.cut_surface import decide_side, decided_side, on_cut_surface, past_offset
 from tissue.cutting.minimum_cut import FlowGraph, clear_lips, minimum_cut, put_on_lip
 from tissue.cutting.separation import open_faces, small_piece
 from tissue.cutting.workspace import Cut
@@ -17,8 +18,8 @@ from tissue.mesh.changes import LISTS
 from tissue.mesh.star import star
 
 MOST_FINISHED = 0.15
-"""Area of the bridges that are finished, as a share of the sheet, at most. Of a stroke that ends
-where a sixth of the way is left, the bridge stays."""
+"""Area of the bridges that are finished, as a share of the cut surface, at most. Of a stroke that
+ends where a sixth of the stroke is left, the bridge stays."""
 
 MOST_PASSED = 0.25
 """The same, of an edge that has left all tissue ahead and of which neither end was ever in it. It
@@ -26,27 +27,27 @@ has passed through all tissue there was: no bridge is one that it left. Where a 
 and breaks away from the edge at once, what no sample saw was up to 18 %."""
 
 MOST_TRIES = 16
-"""Minimum cuts that are looked for, where all but the last would part a crumb."""
+"""Minimum cuts that are tried, where all but the last would part a fragment."""
 
 
 @kernel
-def finish_sheet(cut: Cut, graph: FlowGraph, sheet_area: float) -> None:
+def finish_cut_surface(cut: Cut, graph: FlowGraph, cut_area: float) -> None:
     """Part the bridges between the lips of the current incision if they are small.
 
     Args:
         cut: The changes have been cleared; they are written.
         graph: Without lips, before and after.
-        sheet_area: Area of the faces cut in this incision [m2].
+        cut_area: Area of the faces cut in this incision [m2].
     """
     path = cut.path
     has_passed = path.is_through == 1 and path.has_end_in == 0
-    limit = (MOST_PASSED if has_passed else MOST_FINISHED) * sheet_area
+    limit = (MOST_PASSED if has_passed else MOST_FINISHED) * cut_area
     _collect_lips(cut, graph)
     for _ in range(MOST_TRIES):
         area = minimum_cut(graph, cut.body, cut.visits, limit)
         if area == 0.0 or area > limit or not _cut_links(cut, graph):
             break
-        if not _spare_crumbs(cut, graph):
+        if not _spare_fragments(cut, graph):
             _note_sides(cut)
             area_before = cut.change.area
             open_faces(cut)
@@ -59,13 +60,13 @@ def finish_sheet(cut: Cut, graph: FlowGraph, sheet_area: float) -> None:
 @kernel
 def _collect_lips(cut: Cut, graph: FlowGraph) -> None:
     """Find the tetrahedra of the lips: those with a face that this incision has cut."""
-    body, sheet, around = cut.body, cut.sheet, cut.scratch.around
-    for i in range(sheet.n_nodes):
-        node = sheet.nodes[i]
+    body, surface, around = cut.body, cut.surface, cut.scratch.around
+    for i in range(surface.n_nodes):
+        node = surface.nodes[i]
         n = star(body, cut.visits, node, body.node_tetrahedron[node], around)
         for j in range(n):
             t = around[j]
-            side = decided_side(sheet, t)
+            side = decided_side(surface, t)
             if side == 0 or graph.lip[t] != 0:
                 continue
             for f in range(4):
@@ -115,35 +116,35 @@ def _restore_links(cut: Cut) -> None:
 
 
 @kernel
-def _spare_crumbs(cut: Cut, graph: FlowGraph) -> bool:
-    """Take crumbs that the cut would part off the lips; return whether there are any.
+def _spare_fragments(cut: Cut, graph: FlowGraph) -> bool:
+    """Take fragments that the cut would part off the lips; return whether there are any.
 
-    A crumb hangs on one lip and touches the other with a few faces. Parting these would make it
+    A fragment hangs on one lip and touches the other with a few faces. Parting these would make it
     loose, and would not part the lips.
     """
     change, visits, piece = cut.change, cut.visits, cut.scratch.around
     first = visits.epoch + 1
-    any_crumb = False
+    any_fragment = False
     for row in range(change.n_faces):
         for j in range(0, 4, 2):
             n = small_piece(cut, change.faces[row, j], first)
-            any_crumb = any_crumb or n > 0
+            any_fragment = any_fragment or n > 0
             for i in range(n):
                 graph.lip[piece[i]] = 0
                 visits.tetrahedra[piece[i]] = 0  # a stamp of `first` or later: of a large piece
-    return any_crumb
+    return any_fragment
 
 
 @kernel
 def _note_sides(cut: Cut) -> None:
-    """Note the sides of the tetrahedra at the new faces, and the nodes that no blade passed."""
+    """Store the sides of the tetrahedra at the new faces, and the nodes that no blade passed."""
     body, change = cut.body, cut.change
     for row in range(change.n_faces):
         t = change.faces[row, 0]
-        decide_side(cut.sheet, t, 1)
-        decide_side(cut.sheet, change.faces[row, 2], -1)
+        decide_side(cut.surface, t, 1)
+        decide_side(cut.surface, change.faces[row, 2], -1)
         for k in range(4):
             node = body.tetrahedra[t, k]
-            is_new = not on_sheet(cut.sheet, node) and past_offset(cut.sheet, node) < 0.0
+            is_new = not on_cut_surface(cut.surface, node) and past_offset(cut.surface, node) < 0.0
             if k != change.faces[row, 1] and is_new:
                 body.off_path[node] = -1.0

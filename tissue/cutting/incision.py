@@ -2,29 +2,34 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn, Protocol
 
+from tissue.cut_settings import CutSettings
 from tissue.cutting.blade_path import Path, new_path, path_travel
-from tissue.cutting.scheme import Scheme
+from tissue.cutting.stellar_scheme import StellarScheme
+from tissue.cutting.workspace import SnapLimits
 from tissue.mesh.body import Body
-from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.changes import Change, ChangedMesh
 from tissue.mesh.star import LARGEST_STAR, Visits
-from tissue.types import TissueError
+from tissue.types import SchemeStatistics, TissueError
 
 INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
 steep curves leave tetrahedra that bridge the cut."""
 
 MOST_EDGE_INCREMENTS = 10_000
-"""Increments of a step at most: half a minute of wall time in an organ, for a way of some meters.
+"""Increments of a step at most: half a minute of wall time in an organ, for a path of some metres.
 More is taken for a mistake, which would keep a process for hours."""
 
 RESTING_SPEED = 0.2
 """Mean node sizes per second below which the edge counts as at rest."""
 
 RESTING_TIME = 0.02
-"""How long it is so before the cut opens up to the edge [s]. A trembling hand stands still for an
+"""Time at rest before the cut opens up to the edge [s]. A trembling hand stands still for an
 instant at each turn; to lay a crack front there each time would shred the mesh."""
+
+_SCHEMES = ("stellar", "paper")
+"""Names of the schemes: ours, and that of Bielser, Maiwald and Gross."""
 
 
 class NoRoomError(Exception):
@@ -45,7 +50,7 @@ class CutHooks(NamedTuple):
     """Calls of the owner of the mesh while it is cut.
 
     They are passed to each call and not kept: the owner holds the incision, and a cycle of the two
-    would keep the arrays of a body in memory until Python looks for cycles.
+    would keep the arrays of a body in memory until Python searches for cycles.
     """
 
     before_cut: Callable[[], None]
@@ -56,6 +61,63 @@ class CutHooks(NamedTuple):
     """Called after the last pass."""
     mesh: Callable[[], tuple[Body, Visits]]
     """Returns the body as it is now, and scratch for searches."""
+
+
+class Scheme(Protocol):
+    """A method of cutting a mesh. It owns the arrays of the incision, not those of the body.
+
+    A cut step is `detect` (CD), then `cut` (GC). Where `cut` runs out of room (`change.is_full`),
+    `grow`, `detect` and `cut` follow until one pass is complete.
+    """
+
+    change: Change
+    """Changes of the last pass, and the area cut since the body was made."""
+
+    @property
+    def n_active(self) -> int:
+        """Number of active tetrahedra (paper, section 3)."""
+        ...
+
+    def detect(self, body: Body, visits: Visits, path: Path) -> None:
+        """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
+        ...
+
+    def cut(self, body: Body, visits: Visits, path: Path) -> None:
+        """Cut what was detected, in one pass."""
+        ...
+
+    def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
+        """Cut up to the edge itself, which rests, in one pass."""
+        ...
+
+    def end(self, body: Body, visits: Visits, path: Path) -> None:
+        """Cut what remains when the blade has left the incision, in one pass."""
+        ...
+
+    def finish(self, body: Body, visits: Visits, path: Path) -> None:
+        """Part small bridges that the blade passed over, in one pass; nothing may be left to do."""
+        ...
+
+    def forget(self) -> None:
+        """Forget the incision: what is detected next belongs to another."""
+        ...
+
+    def statistics(self, body: Body) -> SchemeStatistics | None:
+        """Return counts of what was done so far; None where the scheme keeps none."""
+        ...
+
+    @property
+    def doubled_nodes(self) -> int:
+        """For how many times as many doubled nodes as usual a pass is to have room."""
+        ...
+
+    def make_room(self, lacking: int) -> None:
+        """Make twice the room for what lacked it: `LISTS`, or `NODES` by `doubled_nodes`."""
+        ...
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        ...
 
 
 class Incision:
@@ -89,7 +151,7 @@ class Incision:
     def n_increments(self, travel: float) -> int:
         """Return in how many increments the edge moves that far [m], little in each.
 
-        It is 1 for a way that is not finite: a blade that goes it is refused anyway.
+        It is 1 for a path that is not finite: a blade on it is refused anyway.
 
         Raises:
             ValueError: there are more than `MOST_EDGE_INCREMENTS`.
@@ -133,7 +195,7 @@ class Incision:
         self._cut_in_passes(self.scheme.cut, hooks)
 
     def open_to_edge(self, hooks: CutHooks) -> None:
-        """Cut up to the edge itself, which rests or leaves the way that it came."""
+        """Cut up to the edge itself, which rests or leaves the path that it came by."""
         self._detect(*hooks.mesh())
         self._cut_in_passes(self.scheme.cut_to_edge, hooks)
         self._is_open = True
@@ -207,3 +269,43 @@ class Incision:
             f"a node has more than {LARGEST_STAR} tetrahedra around it, which is more than a cut "
             "can divide. Use a mesh without such nodes, or a larger guard (`CutSettings.guard`)"
         )
+
+
+def checked_scheme(name: str) -> str:
+    """Return the name of a scheme.
+
+    Raises:
+        ValueError: there is no such scheme.
+    """
+    if name not in _SCHEMES:
+        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(_SCHEMES)}")
+    return name
+
+
+LARGEST_FRAGMENT = 0.125
+"""Volume of a fragment at most, as a share of the body's: half of a body of six tetrahedra is
+none."""
+
+
+def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size: float) -> Scheme:
+    """Return the scheme of that name.
+
+    Args:
+        name: `stellar` or `paper`.
+        cut: How closely cuts follow the blade, where the scheme lets one choose.
+        body: The body to be cut; whole.
+        density: Mass per volume at rest [kg/m3].
+        node_size: Mean node size of the body [m].
+    """
+    if name == "paper":  # imported late: its kernels would cost every start 0.8 s
+        from tissue.cutting.bielser_1998.scheme import PaperScheme
+
+        return PaperScheme(body, density, node_size)
+    volume = body.masses.sum() / density
+    lengths = SnapLimits(
+        snap=float(cut.snap),
+        floor=float(cut.floor * node_size),
+        guard=float(cut.guard * node_size),
+        crumb=float(min(cut.crumb / body.n_tetrahedra, LARGEST_FRAGMENT) * volume),
+    )
+    return StellarScheme(lengths, len(body.rest), len(body.tetrahedra))

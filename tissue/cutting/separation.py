@@ -1,7 +1,8 @@
-"""Separation: cut the links across the faces on the sheet, and give each lip its own nodes.
+"""Separation: cut the links across the faces on the cut surface, and give each lip its own nodes.
 
-A face is cut if its three nodes lie on the sheet and its two tetrahedra are on different sides of
-the sheet. A node whose tetrahedra are then no longer connected through faces is doubled.
+A face is cut if its three nodes lie on the cut surface and its two tetrahedra are on different
+sides of the cut surface. A node whose tetrahedra are then no longer connected through faces is
+doubled.
 """
 
 from tissue.core.jit import kernel
@@ -11,8 +12,8 @@ from tissue.cutting.cut_surface import (
     decide_side,
     decided_side,
     note_side,
-    on_sheet,
-    put_on_sheet,
+    on_cut_surface,
+    put_on_cut_surface,
     side_of,
 )
 from tissue.cutting.workspace import Cut
@@ -21,15 +22,15 @@ from tissue.mesh.body import CUT, Body, local_index
 from tissue.mesh.changes import LISTS, NODES, note_dirty
 from tissue.mesh.star import star
 
-CRUMB_TETRAHEDRA = 16
-"""Tetrahedra that a crumb has at most: a closed piece of more of them is always cut loose."""
+FRAGMENT_TETRAHEDRA = 16
+"""Tetrahedra that a fragment has at most: a closed piece of more of them is always cut loose."""
 
 
 @kernel
-def open_sheet(cut: Cut) -> None:
-    """Cut the faces on the sheet, and double their nodes."""
+def open_cut_surface(cut: Cut) -> None:
+    """Cut the faces on the cut surface, and double their nodes."""
     _mark_faces(cut)
-    _keep_crumbs(cut)
+    _keep_fragments(cut)
     open_faces(cut)
     for i in range(cut.change.n_flagged):
         _detach_fans(cut, cut.change.flagged[i])
@@ -48,12 +49,12 @@ def open_faces(cut: Cut) -> None:
 
 
 @kernel
-def close_sheet(cut: Cut) -> None:
-    """Cut what remains along the whole sheet: by now the sides of all its nodes are known."""
-    sheet = cut.sheet
-    for i in range(sheet.n_nodes):
-        _mark_faces_at_node(cut, sheet.nodes[i])
-    open_sheet(cut)
+def close_cut_surface(cut: Cut) -> None:
+    """Cut what remains along the whole cut surface: by now the sides of all its nodes are known."""
+    surface = cut.surface
+    for i in range(surface.n_nodes):
+        _mark_faces_at_node(cut, surface.nodes[i])
+    open_cut_surface(cut)
 
 
 @kernel
@@ -78,16 +79,16 @@ def _mark_faces(cut: Cut) -> None:
 
 @kernel
 def _mark_faces_of(cut: Cut, t: int) -> None:
-    body, sheet, change = cut.body, cut.sheet, cut.change
+    body, surface, change = cut.body, cut.surface, cut.change
     n_on = 0
     for k in range(4):
-        if on_sheet(sheet, body.tetrahedra[t, k]):
+        if on_cut_surface(surface, body.tetrahedra[t, k]):
             n_on += 1
     if n_on < 3:
         return
     for f in range(4):
         link = body.links[t, f]
-        if link < 0 or (n_on == 3 and on_sheet(sheet, body.tetrahedra[t, f])):
+        if link < 0 or (n_on == 3 and on_cut_surface(surface, body.tetrahedra[t, f])):
             continue
         if n_on == 4 and not _face_is_on(cut, t, f):
             continue
@@ -97,12 +98,12 @@ def _mark_faces_of(cut: Cut, t: int) -> None:
         if side * other_side >= 0:
             continue
         if _n_links(body, t) == 1 or _n_links(body, other) == 1:
-            continue  # a tetrahedron keeps its last link: alone it would be a crumb
+            continue  # a tetrahedron keeps its last link: alone it would be a fragment
         if change.n_faces == len(change.faces):
             change.lacks_room = LISTS
             return
-        decide_side(sheet, t, side)
-        decide_side(sheet, other, other_side)
+        decide_side(surface, t, side)
+        decide_side(surface, other, other_side)
         row = change.n_faces
         change.n_faces += 1
         change.faces[row, 0] = t
@@ -116,7 +117,7 @@ def _mark_faces_of(cut: Cut, t: int) -> None:
 @kernel
 def _face_is_on(cut: Cut, t: int, f: int) -> bool:
     for k in range(4):
-        if k != f and not on_sheet(cut.sheet, cut.body.tetrahedra[t, k]):
+        if k != f and not on_cut_surface(cut.surface, cut.body.tetrahedra[t, k]):
             return False
     return True
 
@@ -132,24 +133,25 @@ def _n_links(body: Body, t: int) -> int:
 
 @kernel
 def tetrahedron_side(cut: Cut, t: int) -> int:
-    """Return the side of the sheet that tetrahedron `t` is on: +1, -1, or 0 where it is on both.
+    """Return the side of the cut surface of tetrahedron `t`: +1, -1, or 0 where it is on both.
 
-    A decision stays. Otherwise its nodes off the sheet decide: by the side that they were found on,
-    else by their positions. Where all four nodes are on the sheet, the centroid decides.
+    A decision stays. Otherwise its nodes off the cut surface decide: by the side that they were
+    found on, else by their positions. Where all four nodes are on the cut surface, the centroid
+    decides.
     """
-    decided = decided_side(cut.sheet, t)
+    decided = decided_side(cut.surface, t)
     if decided != 0:
         return decided
-    body, sheet = cut.body, cut.sheet
+    body, surface = cut.body, cut.surface
     seen = 0
     n_off = 0
     mixed = False
     for k in range(4):
         node = body.tetrahedra[t, k]
-        if on_sheet(sheet, node):
+        if on_cut_surface(surface, node):
             continue
         n_off += 1
-        side = side_of(sheet, node)
+        side = side_of(surface, node)
         if side != 0:
             mixed = mixed or (seen != 0 and side != seen)
             seen = side
@@ -167,7 +169,7 @@ def tetrahedron_side(cut: Cut, t: int) -> int:
     geometric = 0
     for k in range(4):
         node = body.tetrahedra[t, k]
-        if not on_sheet(sheet, node):
+        if not on_cut_surface(surface, node):
             side = _geometric_side(vec3(body.rest, node), plane.point, plane.normal)
             if geometric != 0 and side != geometric:
                 return 0
@@ -181,7 +183,7 @@ def _geometric_side(p: Vec3, on: Vec3, normal: Vec3) -> int:
 
 
 @kernel
-def _keep_crumbs(cut: Cut) -> None:
+def _keep_fragments(cut: Cut) -> None:
     """Link small closed pieces that this pass made back to the side of larger contact."""
     change, body, scratch, visits = cut.change, cut.body, cut.scratch, cut.visits
     n_faces = change.n_faces
@@ -222,7 +224,7 @@ def small_piece(cut: Cut, start: int, first: int) -> int:
         for f in range(4):
             link = body.links[piece[i], f]
             if link >= 0 and visits.tetrahedra[link // 4] != epoch:
-                if n == CRUMB_TETRAHEDRA or visits.tetrahedra[link // 4] >= first:
+                if n == FRAGMENT_TETRAHEDRA or visits.tetrahedra[link // 4] >= first:
                     return 0
                 visits.tetrahedra[link // 4] = epoch
                 piece[n] = link // 4
@@ -237,7 +239,7 @@ def _relink(cut: Cut, n: int) -> None:
 
     The piece was just collected, so its tetrahedra are stamped with the current visit.
     """
-    change, body, sheet = cut.change, cut.body, cut.sheet
+    change, body, surface = cut.change, cut.body, cut.surface
     epoch = cut.visits.epoch
     area_plus = 0.0
     area_minus = 0.0
@@ -245,7 +247,7 @@ def _relink(cut: Cut, n: int) -> None:
         outside = _outside_of_piece(cut, row, epoch)
         if outside >= 0:
             area = face_area(body.rest, body.tetrahedra, change.faces[row, 0], change.faces[row, 1])
-            if decided_side(sheet, outside) > 0:
+            if decided_side(surface, outside) > 0:
                 area_plus += area
             else:
                 area_minus += area
@@ -254,7 +256,7 @@ def _relink(cut: Cut, n: int) -> None:
     side = 1 if area_plus >= area_minus else -1
     for row in range(change.n_faces):
         outside = _outside_of_piece(cut, row, epoch)
-        if outside >= 0 and decided_side(sheet, outside) == side:
+        if outside >= 0 and decided_side(surface, outside) == side:
             t = change.faces[row, 0]
             f = change.faces[row, 1]
             other = change.faces[row, 2]
@@ -263,7 +265,7 @@ def _relink(cut: Cut, n: int) -> None:
             body.links[other, g] = 4 * t + f
             change.faces[row, 1] = -1
     for i in range(n):
-        decide_side(sheet, cut.scratch.around[i], side)
+        decide_side(surface, cut.scratch.around[i], side)
 
 
 @kernel
@@ -307,7 +309,7 @@ def _detach_fans(cut: Cut, node: int) -> None:
 
 @kernel
 def _detach(cut: Cut, node: int, t: int) -> None:
-    """Give the part of the star of `node` that holds `t` a copy of `node`, if it is apart."""
+    """Double `node` for the part of its star that holds `t`, if that is apart."""
     body, scratch, change, visits = cut.body, cut.scratch, cut.change, cut.visits
     star(body, visits, node, body.node_tetrahedron[node], scratch.around)
     if visits.tetrahedra[t] == visits.epoch:
@@ -325,7 +327,7 @@ def _detach(cut: Cut, node: int, t: int) -> None:
 
 @kernel
 def _copy_node(cut: Cut, node: int) -> int:
-    body, sheet = cut.body, cut.sheet
+    body, surface = cut.body, cut.surface
     copy = body.n_nodes
     body.n_nodes += 1
     for x in range(3):
@@ -338,8 +340,8 @@ def _copy_node(cut: Cut, node: int) -> int:
     body.twin[copy] = body.twin[node]
     body.twin[node] = copy
     body.off_path[copy] = body.off_path[node]
-    if on_sheet(sheet, node):
-        put_on_sheet(sheet, copy, sheet.offset[node])
-    note_side(sheet, copy, side_of(sheet, node), True)
-    sheet.past_offset[copy] = sheet.past_offset[node]
+    if on_cut_surface(surface, node):
+        put_on_cut_surface(surface, copy, surface.offset[node])
+    note_side(surface, copy, side_of(surface, node), True)
+    surface.past_offset[copy] = surface.past_offset[node]
     return copy

@@ -1,7 +1,7 @@
-"""Snapping: at each crossing of the sheet use a node that is there, or insert one.
+"""Snapping: at each crossing of the cut surface use a node that is there, or insert one.
 
 The rule is one of distance, not of the fraction along the edge, so that the result does not depend
-on the order of crossings and no thin tetrahedron has its four nodes on the sheet.
+on the order of crossings and no thin tetrahedron has its four nodes on the cut surface.
 """
 
 import math
@@ -9,7 +9,7 @@ import math
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 from tissue.cutting.blade_path import LEAST_ALIGNMENT, nearest_on_edge, plane_at
-from tissue.cutting.cut_surface import note_side, on_sheet, past_offset
+from tissue.cutting.cut_surface import note_side, on_cut_surface, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
     face_split_is_good,
@@ -22,23 +22,23 @@ from tissue.mesh.body import CUT
 from tissue.mesh.star import node_size, star
 
 EXPLAINED = 1.5
-"""An on-sheet end of an edge explains its crossing if it is at most this many times as far from the
-sheet as when it was put there. With less, the same cut again adds elements."""
+"""An on-surface end of an edge explains its crossing if it is at most this many times as far from
+the cut surface as when it was put there. With less, the same cut again adds elements."""
 
 EXPLAINED_SHARE = 0.05
-"""Share of the edge's length within which an on-sheet end explains a crossing in any case."""
+"""Share of the edge's length within which an on-surface end explains a crossing in any case."""
 
 
 @kernel
 def snap_distance(cut: Cut, node: int) -> float:
     """Return the distance within which a crossing moves to `node` [m].
 
-    A node on an earlier cut may lie further from that sheet than its smaller neighbours now allow.
-    It takes crossings from that distance too, so that the same cut again adds nothing.
+    A node on an earlier cut may lie further from that cut surface than its smaller neighbours now
+    allow. It takes crossings from that distance too, so that the same cut again adds nothing.
     """
     size = node_size(cut.body, cut.visits, node, cut.scratch.around)
     distance = max(cut.limits.snap * size, cut.limits.floor)
-    past = EXPLAINED * past_offset(cut.sheet, node)
+    past = EXPLAINED * past_offset(cut.surface, node)
     if past > distance and _is_on_parallel_cut(cut, node):
         return past
     return distance
@@ -46,7 +46,7 @@ def snap_distance(cut: Cut, node: int) -> float:
 
 @kernel
 def _is_on_parallel_cut(cut: Cut, node: int) -> bool:
-    """Return whether a cut face at `node` is parallel to the sheet, or none is known."""
+    """Return whether a cut face at `node` is parallel to the cut surface, or none is known."""
     body, around = cut.body, cut.scratch.around
     segment = nearest_on_edge(cut.path, vec3(body.rest, node)).segment
     if segment < 0:
@@ -98,7 +98,7 @@ def _comes_first(cut: Cut, i: int, j: int) -> bool:
 
 @kernel
 def insert_crossings(cut: Cut) -> None:
-    """Give every crossed edge a node on the sheet, and each of its ends a side."""
+    """Put on every crossed edge a node on the cut surface, and each of its ends a side."""
     sort_crossings(cut)
     scratch = cut.scratch
     for i in range(scratch.n_crossings):
@@ -116,7 +116,7 @@ def insert_crossings(cut: Cut) -> None:
 
 @kernel
 def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
-    """Give edge ab a node on the sheet, and its ends a side.
+    """Put a node of edge ab on the cut surface, and set the sides of its ends.
 
     Args:
         cut: Read and written.
@@ -125,9 +125,9 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
         segment: Segment of the cutting edge that crossed it.
         t: Fraction along ab at which it did.
     """
-    sheet, body = cut.sheet, cut.body
-    if on_sheet(sheet, a) and on_sheet(sheet, b):
-        return  # the edge lies in the sheet; on a lip it must stay equal to its twin
+    surface, body = cut.surface, cut.body
+    if on_cut_surface(surface, a) and on_cut_surface(surface, b):
+        return  # the edge lies in the cut surface; on a lip it must stay equal to its twin
     pa = vec3(body.rest, a)
     pb = vec3(body.rest, b)
     normal = plane_at(cut.path, segment, lerp(t, pa, pb)).normal
@@ -135,16 +135,16 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
     height = abs(dot(edge, normal))
     length = norm(edge)
     side = 1 if dot(edge, normal) >= 0.0 else -1
-    explained_by_a = on_sheet(sheet, a) and _explained(cut, a, t * height, length)
-    explained_by_b = on_sheet(sheet, b) and _explained(cut, b, (1.0 - t) * height, length)
+    explained_by_a = on_cut_surface(surface, a) and _explained(cut, a, t * height, length)
+    explained_by_b = on_cut_surface(surface, b) and _explained(cut, b, (1.0 - t) * height, length)
     if explained_by_a or explained_by_b:
-        if not on_sheet(sheet, a):
-            note_side(sheet, a, side, False)
-        if not on_sheet(sheet, b):
-            note_side(sheet, b, -side, False)
+        if not on_cut_surface(surface, a):
+            note_side(surface, a, side, False)
+        if not on_cut_surface(surface, b):
+            note_side(surface, b, -side, False)
         return
-    note_side(sheet, a, side, True)
-    note_side(sheet, b, -side, True)
+    note_side(surface, a, side, True)
+    note_side(surface, b, -side, True)
     near_a = t * height / snap_distance(cut, a)
     near_b = (1.0 - t) * height / snap_distance(cut, b)
     if min(near_a, near_b) < 1.0 or not edge_split_is_good(cut, a, b, t):
@@ -157,15 +157,15 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
 
 @kernel
 def _explained(cut: Cut, node: int, distance: float, length: float) -> bool:
-    """Return whether an on-sheet node, that far from the sheet, explains a crossing of its edge."""
+    """Return whether a node on the surface, that far from it, explains a crossing of its edge."""
     allowance = max(EXPLAINED_SHARE * length, snap_distance(cut, node))
-    is_near: bool = distance <= EXPLAINED * cut.sheet.offset[node] + allowance
+    is_near: bool = distance <= EXPLAINED * cut.surface.offset[node] + allowance
     return is_near
 
 
 @kernel
 def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
-    """Return a node on the sheet in face abc: a corner, a node on a side, or one inside.
+    """Return a node on the cut surface in face abc: a corner, a node on a side, or one inside.
 
     Args:
         cut: Read and written.
@@ -195,8 +195,12 @@ def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     near_b = norm(sub(p, pb)) / snap_b
     near_c = norm(sub(p, pc)) / snap_c
     nearest = min(near_a, min(near_b, near_c))
-    lies_in_sheet = on_sheet(cut.sheet, a) and on_sheet(cut.sheet, b) and on_sheet(cut.sheet, c)
-    if nearest < 1.0 or lies_in_sheet:
+    lies_in_surface = (
+        on_cut_surface(cut.surface, a)
+        and on_cut_surface(cut.surface, b)
+        and on_cut_surface(cut.surface, c)
+    )
+    if nearest < 1.0 or lies_in_surface:
         corner = a if near_a == nearest else (b if near_b == nearest else c)
         flag(cut, corner)
         return corner
@@ -219,9 +223,9 @@ def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
 
 @kernel
 def _insert_in_side(cut: Cut, a: int, b: int, t: float, snap_a: float, snap_b: float) -> int:
-    """Return a node on the sheet at fraction `t` of edge ab."""
+    """Return a node on the cut surface at fraction `t` of edge ab."""
     closer = a if t < 0.5 else b
-    if on_sheet(cut.sheet, a) and on_sheet(cut.sheet, b):
+    if on_cut_surface(cut.surface, a) and on_cut_surface(cut.surface, b):
         return closer
     length = norm(sub(vec3(cut.body.rest, a), vec3(cut.body.rest, b)))
     near = min(t * length / snap_a, (1.0 - t) * length / snap_b)

@@ -1,19 +1,24 @@
 """Our scheme of cutting: stellar subdivision, crack front, separation.
 
-Nodes are inserted where the sheet crosses edges of the mesh, by splitting whole stars; the faces
-that then tile the sheet are cut; nodes whose stars fell apart are doubled. There is no table of
-cases, so that no case is missing: cuts may cross, turn back and join.
+Nodes are inserted where the cut surface crosses edges of the mesh, by splitting whole stars; the
+faces that then tile the cut surface are cut; nodes whose stars fell apart are doubled. There is no
+table of cases, so that no case is missing: cuts may cross, turn back and join.
 """
+
+from typing import Final
 
 import numpy as np
 
-from tissue.core.jit import SameTypes
+from tissue.core.jit import SameTypes, kernel
 from tissue.cutting.blade_path import Path
+from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
-from tissue.cutting.cut_pass import ALONG_PATH, TO_EDGE, TO_THE_END, cut_in_a_pass
-from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
-from tissue.cutting.finishing import finish_sheet
+from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
+from tissue.cutting.cut_surface import begin_cut_surface, grown_cut_surface, new_cut_surface
+from tissue.cutting.finishing import finish_cut_surface
 from tissue.cutting.minimum_cut import new_flow_graph
+from tissue.cutting.separation import close_cut_surface, open_cut_surface
+from tissue.cutting.snapping import insert_crossings
 from tissue.cutting.workspace import (
     Cut,
     SnapLimits,
@@ -25,13 +30,40 @@ from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
+ALONG_PATH: Final = 0
+"""Cut what was detected along the path of the edge."""
+
+TO_EDGE: Final = 1
+"""Cut up to the edge itself, which rests."""
+
+TO_THE_END: Final = 2
+"""Cut what remains when the blade has left the incision."""
+
+
+@kernel
+def cut_in_a_pass(cut: Cut, how_far: int) -> None:
+    """Cut what was detected, as far as there is room; `how_far`: one of the constants above."""
+    clear_changes(cut.change)
+    if how_far == TO_EDGE:
+        bring_front_to_blade(cut)
+    else:
+        insert_crossings(cut)
+        extend_fronts(cut)
+    resolve_bridges(cut)
+    if how_far == TO_THE_END:
+        close_cut_surface(cut)
+    else:
+        open_cut_surface(cut)
+    remember_active(cut)
+
+
 _DETECT, _CUT = SameTypes(detect_collisions), SameTypes(cut_in_a_pass)
 
 
 class StellarScheme:
-    """Our scheme, with sheet, changes and scratch of the current incision.
+    """Our scheme, with cut surface, changes and scratch of the current incision.
 
-    The methods are those of `tissue.cutting.scheme.Scheme`.
+    The methods are those of `tissue.cutting.incision.Scheme`.
 
     Args:
         limits: When a node that is there is used in place of a new one.
@@ -43,7 +75,7 @@ class StellarScheme:
         self.change = new_change()
         self.doubled_nodes = 1
         self._limits = limits
-        self._sheet = new_sheet(n_nodes, n_tetrahedra)
+        self._surface = new_cut_surface(n_nodes, n_tetrahedra)
         self._scratch = new_cut_scratch(n_tetrahedra)
         self._graph = new_flow_graph(n_tetrahedra)
         self._area_before = 0.0
@@ -76,11 +108,11 @@ class StellarScheme:
         """Part small bridges that the blade passed over, in one pass."""
         cut = self._arrays(body, visits, path)
         clear_changes(cut.change)
-        finish_sheet(cut, self._graph, self.change.area - self._area_before)
+        finish_cut_surface(cut, self._graph, self.change.area - self._area_before)
 
     def forget(self) -> None:
         """Forget the incision: what is detected next belongs to another."""
-        begin_sheet(self._sheet)
+        begin_cut_surface(self._surface)
         self._area_before = self.change.area
         self._scratch.n_previous = 0
 
@@ -95,7 +127,7 @@ class StellarScheme:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
+        self._surface = grown_cut_surface(self._surface, n_nodes, n_tetrahedra)
         self._scratch = self._scratch.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._graph = new_flow_graph(n_tetrahedra)
         self._cut = None
@@ -116,7 +148,7 @@ class StellarScheme:
         return Cut(
             body=body,
             visits=visits,
-            sheet=self._sheet,
+            surface=self._surface,
             path=path,
             change=self.change,
             scratch=self._scratch,

@@ -14,9 +14,8 @@ from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import local_index
-from tissue.mesh.changes import note_child, note_dirty
+from tissue.mesh.changes import PASS_NODES, SPARE_NODES, note_child, note_dirty
 from tissue.mesh.star import edge_star
-from tissue.mesh.workspace import PASS_NODES, SPARE_NODES
 
 NO_ROOM = -1
 """Returned in place of a node where the arrays must grow first."""
@@ -164,13 +163,13 @@ def _new_node(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     body.masses[node] = 0.0
     body.twin[node] = node
     body.off_path[node] = 0.0
-    touch(cut.sheet, node)
+    touch(cut.surface, node)
     return node
 
 
 @kernel
 def _note_spin(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3, node: int) -> None:
-    """Note the rotation of the ends about the new node: it has a share of their masses now."""
+    """Store the rotation of the ends about the new node: it has a share of their masses now."""
     body, volume = cut.body, 0.0
     for i in range(n):
         volume += tetrahedron_volume(body.rest, body.tetrahedra, cut.scratch.parents[i])
@@ -187,7 +186,7 @@ def _note_spin(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3, n
 def _make_children(cut: Cut, i: int, n_ends: int, a: int, b: int, c: int, node: int) -> None:
     body, scratch = cut.body, cut.scratch
     parent = scratch.parents[i]
-    side = decided_side(cut.sheet, parent)
+    side = decided_side(cut.surface, parent)
     # The last child first: child 0 overwrites the parent.
     for back in range(n_ends):
         e = n_ends - 1 - back
@@ -195,7 +194,7 @@ def _make_children(cut: Cut, i: int, n_ends: int, a: int, b: int, c: int, node: 
         for k in range(4):
             old = body.tetrahedra[parent, k]
             body.tetrahedra[child, k] = node if old == _pick(e, a, b, c) else old
-        decide_side(cut.sheet, child, side)
+        decide_side(cut.surface, child, side)
         note_dirty(cut.change, child)
         if child != parent:
             note_child(cut.change, child, parent)

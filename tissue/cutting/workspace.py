@@ -1,4 +1,4 @@
-"""All that a cut step reads and writes: body, path, sheet, changes and scratch."""
+"""All that a cut step reads and writes: body, path, cut surface, changes and scratch."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import dot, sub, vec3
 from tissue.cutting.blade_path import Path, plane_near
-from tissue.cutting.cut_surface import CutSheet, on_sheet, put_on_sheet
+from tissue.cutting.cut_surface import CutSurface, on_cut_surface, put_on_cut_surface
 from tissue.mesh.body import Body, grown
 from tissue.mesh.changes import CHANGES, LISTS, Change
 from tissue.mesh.star import LARGEST_STAR, Visits
@@ -80,7 +80,7 @@ class Cut(Arrays):
 
     body: Body
     visits: Visits
-    sheet: CutSheet
+    surface: CutSurface
     path: Path
     change: Change
     scratch: CutScratch
@@ -121,13 +121,13 @@ def scratch_with_twice_the_room(scratch: CutScratch) -> CutScratch:
 
 @kernel
 def flag(cut: Cut, node: int) -> None:
-    """Put `node` on the sheet, and list it in `change.flagged`."""
-    sheet = cut.sheet
-    if not on_sheet(sheet, node):
+    """Put `node` on the cut surface, and list it in `change.flagged`."""
+    surface = cut.surface
+    if not on_cut_surface(surface, node):
         p = vec3(cut.body.rest, node)
         plane = plane_near(cut.path, p)
         offset = abs(dot(sub(p, plane.point), plane.normal))
-        put_on_sheet(sheet, node, offset)
+        put_on_cut_surface(surface, node, offset)
         cut.body.off_path[node] = max(cut.body.off_path[node], offset)
     change = cut.change
     if change.n_flagged == len(change.flagged):

@@ -21,7 +21,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, store_point
 from tissue.core.simd_blocks import alike, load_block, sum_of_lanes, width_of
-from tissue.core.simd_gather import larger
+from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.collapse import collapse_energy
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, n_blocks

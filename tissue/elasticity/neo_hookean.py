@@ -36,7 +36,7 @@ from tissue.core.simd_blocks import (
     values_of_rows,
     width_of,
 )
-from tissue.core.simd_gather import natural, sum_of_eight
+from tissue.core.simd_rows import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed

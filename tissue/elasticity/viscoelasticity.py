@@ -28,7 +28,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import alike, load_block, store_block, width_of
-from tissue.core.simd_gather import larger, where_larger
+from tissue.core.simd_rows import larger, where_larger
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid
 from tissue.elasticity.neo_hookean import (

@@ -3,7 +3,7 @@
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, times
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.elasticity.internal_forces import internal_force
 from tissue.elasticity.mass_scaling import free_fall
 from tissue.elasticity.neo_hookean import solid_force

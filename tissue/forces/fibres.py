@@ -22,6 +22,7 @@ be E / v on a blade of speed v: unbounded on a slow one.
 import math
 from typing import Final, NamedTuple
 
+from tissue.blade.blade_state import RunningTotals, add_reaction, running_totals, store_totals
 from tissue.blade.edge import (
     LEAST_SINE,
     BladePose,
@@ -31,7 +32,6 @@ from tissue.blade.edge import (
     motion_at,
     pose_at,
 )
-from tissue.blade.impulse_totals import RunningTotals, add_reaction, running_totals, store_totals
 from tissue.blade.wrench import WrenchReport, report_fibre
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel

@@ -15,7 +15,7 @@ from tissue.core.vec3 import Vec3, add, axpy, cross, dot, scale, sub, vec3
 from tissue.forces.step_context import StepContext
 from tissue.geometry.tetrahedron import Matrix3, determinant, solve
 from tissue.mesh.body import Body
-from tissue.mesh.loose_pieces import LoosePieces
+from tissue.mesh.pieces import LoosePieces
 
 ROUND_ENOUGH = 1e-9
 """Determinant of a piece's inertia over that of a ball of the same trace, from which it is solved

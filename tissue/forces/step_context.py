@@ -13,7 +13,7 @@ from tissue.core.thread_team import Team
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.forces.attachments import Attachments
 from tissue.mesh.body import Body
-from tissue.mesh.loose_pieces import LoosePieces
+from tissue.mesh.pieces import LoosePieces
 from tissue.mesh.star import Visits
 
 

@@ -13,16 +13,16 @@ function. Three exceptions have physical reasons:
 
 from typing import NamedTuple
 
-from tissue.blade.anchors import is_engaged
-from tissue.blade.blade_mass import limit_frequency_at_blade
 from tissue.blade.edge import Edge
+from tissue.blade.edge_anchors import is_engaged
+from tissue.blade.faces_contact import faces_energy
 from tissue.blade.forces import (
     apply_blade_forces,
     apply_slip,
     edge_energy,
     frequency_with_blade,
+    limit_frequency_at_blade,
 )
-from tissue.blade.side_contact import sides_energy
 from tissue.contact.geoms.kinematic_contact import clear_geom_forces, end_geom_substep
 from tissue.contact.response.contacts import clear_contact_forces
 from tissue.contact.response.forces import add_contact_forces, end_contact_substep
@@ -177,7 +177,7 @@ def energy_of_terms(context: StepContext, edge: Edge, when: float) -> TermEnergi
     body, blade, attachments = context.body, context.blade, context.attachments
     return TermEnergies(
         edge_energy(blade, body, edge, when),
-        sides_energy(blade.sides),
+        faces_energy(blade.sides),
         context.contacts.stored,
         attached_energy(attachments, body.positions, 0, len(attachments.nodes)),
     )
@@ -190,7 +190,7 @@ def leave_at_rest(context: StepContext) -> bool:
     A loose piece that touches nothing drifts on, however slowly.
     """
     blade = context.blade
-    is_touched = is_engaged(blade.anchors) or blade.sides.n_faces > 0 or blade.blunt.n_pressing > 0
+    is_touched = is_engaged(blade.anchors) or blade.sides.n_faces > 0 or blade.spine.n_pressing > 0
     is_drifting = len(context.loose.node) > 0 and context.contacts.n_contacts == 0
     if is_touched or is_drifting or context.supports.is_moving == 1:
         return False

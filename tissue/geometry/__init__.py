@@ -5,7 +5,5 @@ In the order in which they are best read:
     tetrahedron             volumes, altitudes, barycentric weights, 3 x 3 matrices
     aabb                    boxes whose sides are parallel to the axes
     exact_predicates        decisions on integer coordinates, without rounding
-    rotations               whether matrices are rotations
-    polar_decomposition     the rotation in a deformation
-    connected_components    connected components of a graph
+    rotations               whether matrices are rotations; the rotation in a deformation
 """

@@ -12,7 +12,7 @@ import numpy as np
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.integrators.model import TissueModel
 from tissue.material import Material
-from tissue.mesh.loose_pieces import loose_pieces_of
+from tissue.mesh.pieces import loose_pieces_of
 from tissue.mesh.validation import USUAL_EXTENT
 from tissue.types import TissueError
 

@@ -8,7 +8,7 @@ from tissue.forces.step_context import Increment
 from tissue.integrators.model import TissueModel
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.moved_nodes import Moved
+from tissue.mesh.node_motion import Moved
 from tissue.types import TissueError
 
 REMEDY = "A shorter time step, or a material that is softer or heavier, may help"

@@ -5,17 +5,17 @@ wrote; sums are gathered. So the result does not depend on who runs which part o
 (`tissue.core.thread_team`).
 """
 
-from tissue.core.atomics import pause
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.simd_blocks import store_row
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.thread_team import (
     claim_first,
     claim_last,
     end_chunk,
     items_of,
     open_loop,
+    pause,
     wait_for_others,
 )
 from tissue.elasticity.finite_elements import n_blocks

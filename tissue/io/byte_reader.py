@@ -14,7 +14,7 @@ MAX_SHOWN = 40
 """Characters that an error quotes at most."""
 
 PIECE = 1 << 22
-"""Text that is looked at at once [bytes]: it takes some ten times as much memory."""
+"""Text that is searched at once [bytes]: it takes some ten times as much memory."""
 
 
 class ByteReader:

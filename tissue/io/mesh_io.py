@@ -6,6 +6,11 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from tissue.core.array_types import IntArray
 from tissue.io.byte_reader import shown
 from tissue.io.gmsh import read_gmsh
 from tissue.io.vtk_legacy import read_vtk
@@ -42,7 +47,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMe
     Reads Gmsh 1.0, 2.0 to 2.2 and 4.1 (`.msh`), VTK legacy (`.vtk`) and VTK XML (`.vtu`) files, as
     text and binary. Points, lines and triangles in the file are ignored. From `RENUMBER_FROM`
     tetrahedra on, nodes and tetrahedra are put in an order that the caches like
-    (`tissue.mesh.node_order`); the numbers are then not those of the file.
+    (`tissue.io.mesh_io`); the numbers are then not those of the file.
 
     Args:
         path: The file.
@@ -65,9 +70,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMe
     mesh = checked(TetrahedralMesh(mesh.positions * scale, mesh.tetrahedra), str(path)).mesh
     if len(mesh.tetrahedra) < RENUMBER_FROM:
         return mesh
-    from tissue.mesh.node_order import (
-        renumbered,  # imported late: SciPy would cost every start 0.2 s
-    )
+    pass  # LOOK
 
     return renumbered(mesh)[0]
 
@@ -117,3 +120,22 @@ def _other_content(data: bytes) -> str:
     if start.startswith((b"\x1f\x8b", b"pk\x03\x04")):
         return "expected a mesh, found a compressed file: unpack it first"
     return ""
+
+
+def renumbered(mesh: TetrahedralMesh) -> tuple[TetrahedralMesh, IntArray]:
+    """Return the mesh in the order of reverse Cuthill and McKee, and the new number of each node.
+
+    Node `i` of `mesh` is node `place[i]` of the mesh returned. Tetrahedra are in the order of their
+    lowest nodes.
+    """
+    n = len(mesh.positions)
+    pairs = mesh.tetrahedra[:, [0, 0, 0, 1, 1, 2, 1, 2, 3, 2, 3, 3]]
+    ends = pairs.reshape(-1, 2, 6)
+    a, b = ends[:, 0].ravel(), ends[:, 1].ravel()
+    edges = csr_array((np.ones(2 * len(a), np.int8), (np.r_[a, b], np.r_[b, a])), shape=(n, n))
+    order = np.asarray(reverse_cuthill_mckee(edges, symmetric_mode=True), dtype=np.int64)
+    place = np.empty(n, dtype=np.int64)
+    place[order] = np.arange(n)
+    tetrahedra = place[mesh.tetrahedra]
+    tetrahedra = tetrahedra[np.argsort(tetrahedra.min(axis=1), kind="stable")]
+    return TetrahedralMesh(mesh.positions[order], tetrahedra), place

@@ -6,8 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader, as_floats, as_ints, count_in, shown
-from tissue.io.cell_types import uniform_records
-from tissue.io.vtk_cells import tetrahedra_of
+from tissue.io.cell_types import tetrahedra_of, uniform_records
 from tissue.types import TetrahedralMesh
 
 _DTYPES = {

@@ -1,15 +1,19 @@
-"""VTK unstructured grids in XML (`.vtu`): the elements, and where their numbers are."""
+"""VTK unstructured grids in XML (`.vtu`) with numbers as text, in base 64 or appended."""
 
+import base64
+import binascii
+import lzma
 import re
 import xml.etree.ElementTree as ET
+import zlib
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.io.byte_reader import as_floats, as_ints, shown
-from tissue.io.vtk_cells import tetrahedra_of
-from tissue.io.vtu_data import Encoding, decoded
+from tissue.io.byte_reader import ByteReader, as_floats, as_ints, shown
+from tissue.io.cell_types import tetrahedra_of
 from tissue.mesh.mesh_arrays import MeshError
 from tissue.types import TetrahedralMesh
 
@@ -24,7 +28,40 @@ _NUMBER_BYTES = 8
 """Size of a number once it is read [bytes], whatever it is in the file."""
 
 _APPENDED = re.compile(rb"<AppendedData\b[^>]*>\s*_")
+
 _APPENDED_END = b"</AppendedData"
+
+_DTYPES = {
+    "Int8": "i1",
+    "Int16": "i2",
+    "Int32": "i4",
+    "Int64": "i8",
+    "UInt8": "u1",
+    "UInt16": "u2",
+    "UInt32": "u4",
+    "UInt64": "u8",
+    "Float32": "f4",
+    "Float64": "f8",
+}
+"""VTK's names of types."""
+
+LZMA_MEMORY = 2**28
+"""Memory that unpacking may take at most [bytes]; VTK's writers need a tenth of it."""
+
+
+class Encoding(NamedTuple):
+    """Form in which a file writes numbers."""
+
+    byte_order: str
+    """Order of bytes, "<" or ">"."""
+    header_dtype: str
+    """Type of the sizes that stand before the data."""
+    compressor: str
+    """VTK's name of the compressor, or ""."""
+    appended: bytes
+    """The bytes after the underscore in `<AppendedData>`."""
+    appended_is_raw: bool
+    """Whether the appended data is in binary, not in base 64."""
 
 
 def read_vtu(data: bytes) -> TetrahedralMesh:
@@ -142,3 +179,156 @@ class _Piece:
         if element is None:
             raise MeshError(f"expected {path}, found none")
         return element
+
+
+def decoded(
+    element: ET.Element, encoding: Encoding, count: int, name: str
+) -> npt.NDArray[np.generic]:
+    """Return the `count` numbers of a `<DataArray>`, which messages call `name`.
+
+    Raises:
+        MeshError: The array does not hold them.
+    """
+    dtype = _DTYPES.get(element.get("type", ""))
+    if dtype is None:
+        raise MeshError(f"{name}: expected a type, found {shown(element.get('type', ''))}")
+    form = element.get("format", "ascii")
+    try:
+        if form == "ascii":
+            return _from_text(element, dtype, count)
+        if form == "binary":
+            stream = _Stream(_in_base64(element.text), is_raw=False)
+        elif form == "appended":
+            stream = _Stream(_appended(element, encoding), encoding.appended_is_raw)
+        else:
+            raise MeshError(f"expected format ascii, binary or appended, found {shown(form)}")
+        n_bytes = count * np.dtype(dtype).itemsize
+        data = (
+            _compressed(stream, encoding, n_bytes)
+            if encoding.compressor
+            else _plain(stream, encoding, n_bytes)
+        )
+    except MeshError as error:
+        raise MeshError(f"{name}: {error}") from None
+    return np.frombuffer(data, encoding.byte_order + dtype)
+
+
+def _from_text(element: ET.Element, dtype: str, count: int) -> npt.NDArray[np.generic]:
+    """Return numbers written as text."""
+    reader = ByteReader((element.text or "").encode())
+    is_float = dtype.startswith("f")
+    end = len(reader.data)
+    values = reader.floats(end, "numbers") if is_float else reader.ints(end, "whole numbers")
+    reader.expect(count, len(values), "numbers", 0)
+    return values
+
+
+def _in_base64(text: str | None) -> bytes:
+    """Return the text without blanks."""
+    return re.sub(rb"\s+", b"", (text or "").encode())
+
+
+def _appended(element: ET.Element, encoding: Encoding) -> bytes:
+    """Return the appended data from the array's offset on."""
+    offset = element.get("offset", "")
+    is_number = re.fullmatch(r"\s*[0-9]{1,18}\s*", offset)
+    if not is_number or int(offset) > len(encoding.appended):
+        raise MeshError(
+            f"expected an offset into {len(encoding.appended)} bytes of appended data, found "
+            f"{shown(offset)}"
+        )
+    return encoding.appended[int(offset) :]
+
+
+class _Stream:
+    """Bytes, plain or in base 64, taken from the front."""
+
+    def __init__(self, data: bytes, is_raw: bool) -> None:
+        self._data = data
+        self._is_raw = is_raw
+        self._at = 0
+
+    def take(self, n_bytes: int) -> bytes:
+        """Take some bytes; in base 64 a group of characters that stands for them alone."""
+        length = n_bytes if self._is_raw else 4 * -(-n_bytes // 3)
+        piece = self._data[self._at : self._at + length]
+        if len(piece) < length:
+            raise MeshError(f"expected {length} bytes of data, found {len(piece)}")
+        self._at += length
+        if self._is_raw:
+            return piece
+        try:
+            plain = base64.b64decode(piece, validate=True)
+        except binascii.Error as error:
+            raise MeshError(f"expected base 64, found an error in it ({error})") from None
+        if len(plain) < n_bytes:
+            raise MeshError(f"expected {n_bytes} bytes in base 64, found {len(plain)}")
+        return plain[:n_bytes]
+
+    def take_with_header(self, n_header: int, n_bytes: int) -> bytes:
+        """Take a header and then bytes, in base 64 either in one group or in two."""
+        is_in_two = self._data[: 4 * -(-n_header // 3)].endswith(b"=")
+        if self._is_raw or is_in_two:
+            return self.take(n_header) + self.take(n_bytes)
+        return self.take(n_header + n_bytes)
+
+    def rewind(self) -> None:
+        """Go back to the first byte."""
+        self._at = 0
+
+
+def _plain(stream: _Stream, encoding: Encoding, n_bytes: int) -> bytes:
+    """Return bytes that are not compressed: before them stands how many there are."""
+    header = np.dtype(encoding.byte_order + encoding.header_dtype)
+    found = int(np.frombuffer(stream.take(header.itemsize), header)[0])
+    if found != n_bytes:
+        raise MeshError(f"expected {n_bytes} bytes of numbers, found {found}")
+    stream.rewind()
+    return stream.take_with_header(header.itemsize, n_bytes)[header.itemsize :]
+
+
+def _compressed(stream: _Stream, encoding: Encoding, n_bytes: int) -> bytes:
+    """Return bytes compressed in blocks.
+
+    Before them stand the number of blocks, the size of a block, that of the last one (0: it is as
+    large as the others), and the size that each has when compressed.
+    """
+    header = np.dtype(encoding.byte_order + encoding.header_dtype)
+    n_blocks, size, last = np.frombuffer(stream.take(3 * header.itemsize), header).tolist()
+    stream.rewind()
+    sizes = np.frombuffer(stream.take((3 + n_blocks) * header.itemsize), header)[3:].tolist()
+    plain_sizes = [size] * n_blocks
+    if last and n_blocks:
+        plain_sizes[-1] = last
+    if sum(plain_sizes) != n_bytes:
+        raise MeshError(f"expected {n_bytes} bytes of numbers, found {sum(plain_sizes)}")
+    packed = stream.take(sum(sizes))
+    blocks, at = [], 0
+    for packed_size, plain_size in zip(sizes, plain_sizes, strict=True):
+        blocks.append(_unpacked(packed[at : at + packed_size], plain_size, encoding.compressor))
+        at += packed_size
+    return b"".join(blocks)
+
+
+def _unpacked(packed: bytes, size: int, compressor: str) -> bytes:
+    """Return the `size` bytes of one block; one more is unpacked at most, whatever it holds."""
+    unpacker: Any
+    try:
+        if compressor == "vtkZLibDataCompressor":
+            unpacker = zlib.decompressobj()
+        elif compressor == "vtkLZMADataCompressor":
+            unpacker = lzma.LZMADecompressor(memlimit=LZMA_MEMORY)
+        else:
+            raise MeshError(
+                "expected vtkZLibDataCompressor or vtkLZMADataCompressor, found "
+                f"{shown(compressor)}: save it with zlib or uncompressed"
+            )
+        plain: bytes = unpacker.decompress(packed, size + 1)
+    except (zlib.error, lzma.LZMAError, EOFError) as error:
+        raise MeshError(f"expected compressed data, found an error in it ({error})") from None
+    if len(plain) != size:
+        found = f"{len(plain)}" if len(plain) < size else "more"
+        raise MeshError(f"expected {size} bytes in a compressed block, found {found}")
+    if not unpacker.eof:  # the checksum is at the end
+        raise MeshError("expected a whole compressed block, found one without its end")
+    return plain

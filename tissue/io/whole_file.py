@@ -11,10 +11,10 @@ UNFINISHED = ".part"
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a name beside `path` to write a file at, which then replaces the one at `path`.
+    """Yield a name near `path` to write a file at, which then replaces the one at `path`.
 
     Whoever opens `path` finds the old file or the new one, whatever ends the process, and after a
-    loss of power too. An error leaves the old file, and nothing beside it.
+    loss of power too. An error leaves the old file, and nothing else.
 
     Raises:
         OSError: The file cannot be written.
@@ -32,7 +32,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def new_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a name beside `path` to write a file at, which then appears at `path`.
+    """Yield a name near `path` to write a file at, which then appears at `path`.
 
     From the first moment there is an empty file at `path`, so that no other process can take the
     name. An error leaves none.
@@ -52,7 +52,7 @@ def new_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def remove_unfinished(path: str | os.PathLike[str]) -> None:
-    """Remove what processes that were killed have left beside `path`.
+    """Remove what processes that were killed have left near `path`.
 
     Raises:
         OSError: It cannot be removed.

@@ -32,9 +32,8 @@ import math
 
 from tissue.core.jit import inlined
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import alike
-from tissue.core.simd_gather import larger, where_larger
-from tissue.core.simd_logarithm import logarithm
+from tissue.core.simd_blocks import alike, logarithm
+from tissue.core.simd_rows import larger, where_larger
 from tissue.core.vec3 import Vec3, dot
 from tissue.laws.energy_density import EXPONENTIAL, NEO_HOOKEAN, EnergyDensity
 

@@ -18,7 +18,7 @@ as lying on a line, about which no rotation has an angular momentum: nothing is 
 
 @kernel
 def note_spin(change: Change, volume: float, arm: Vec3, motion: Vec3) -> None:
-    """Note the angular momentum that a corner of a tetrahedron no longer has.
+    """Add up the angular momentum that a corner of a tetrahedron no longer has.
 
     Args:
         change: Its `lost_spin` is written.

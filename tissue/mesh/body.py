@@ -26,7 +26,7 @@ CUT = -2
 """Link of a face that a blade made."""
 
 INSIDE_TOLERANCE = 1e-9
-"""How far below 0 a barycentric weight may be for a point that counts as inside: rounding."""
+"""Distance below 0 of a barycentric weight of a point that counts as inside: rounding."""
 
 LONGEST_WALK = 128
 """Tetrahedra that `walk` passes through at most. A step of the edge passes through two or three."""
@@ -60,7 +60,7 @@ class Body(Arrays):
     tetrahedra: IntArray
     """Node indices, shape (capacity, 4)."""
     links: IntArray
-    """What is behind each face, shape (capacity, 4)."""
+    """Half-face behind each face, shape (capacity, 4)."""
     n_nodes: IntCell
     """Number of nodes."""
     n_tetrahedra: IntCell
@@ -193,7 +193,7 @@ class Walk(NamedTuple):
     inside: bool
     """Whether the point is in that tetrahedron."""
     link: int
-    """What stopped the walk if the point is not inside: OUTER, CUT, or 0 if it was too long."""
+    """Obstacle that stopped the walk: OUTER, CUT, or 0 if it was too long or ended inside."""
 
 
 @kernel

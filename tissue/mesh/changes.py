@@ -1,4 +1,4 @@
-"""What a cut step changed in a mesh: nodes put on the sheet, tetrahedra changed, faces cut."""
+"""Changes of a mesh in a cut step, and the room in its arrays that one pass of the step needs."""
 
 from typing import Final, NamedTuple, Protocol
 
@@ -14,18 +14,28 @@ CHANGES = 1 << 15
 """Changes that one pass of a cut step can note at first; `PASS_NODES` of cutting keeps within it in
 meshes of ordinary stars. Where it does not suffice there is more room, and the step is repeated."""
 
-
 LISTS: Final = 1
-"""What lacks room: the lists of a pass."""
+"""Lack of room in the lists of a pass."""
+
 NODES: Final = 2
-"""What lacks room: the arrays of the body, for nodes that are doubled."""
+"""Lack of room in the arrays of the body, for nodes that are doubled."""
+
+PASS_NODES = 256
+"""Nodes that one pass of a cut step puts on the cut surface at most; a step that needs more takes
+several passes. Doubling a node changes some 50 tetrahedra, which must fit into `CHANGES`."""
+
+SPARE_NODES = 4 * PASS_NODES
+"""Room that a pass leaves for doubled nodes: no node becomes more than a few."""
+
+ROOM_FOR_TETRAHEDRA = 1 << 12
+"""Free tetrahedra that a pass of a cut step begins with; more are made between passes."""
 
 
 class Change(Arrays):
-    """What one pass of a cut step changed."""
+    """Changes of one pass of a cut step."""
 
     flagged: IntArray
-    """Nodes that came to lie on the sheet, shape (room,)."""
+    """Nodes that came to lie on the cut surface, shape (room,)."""
     dirty: IntArray
     """Tetrahedra that were split or got another node, with repeats; shape (room,)."""
     faces: IntArray
@@ -64,7 +74,7 @@ class ChangedMesh(NamedTuple):
     visits: Visits
     """Scratch for searches."""
     change: Change
-    """What the pass changed."""
+    """Changes of the pass."""
     nodes: IntArray
     """Nodes of the tetrahedra that changed, each once, shape (n,)."""
 
@@ -127,7 +137,7 @@ def clear_changes(change: Change) -> None:
 
 @kernel
 def note_dirty(change: Change, t: int) -> None:
-    """Note that tetrahedron `t` was changed."""
+    """List tetrahedron `t` as changed."""
     if change.n_dirty == len(change.dirty):
         change.lacks_room = LISTS
         return
@@ -137,7 +147,7 @@ def note_dirty(change: Change, t: int) -> None:
 
 @kernel
 def note_child(change: Change, child: int, parent: int) -> None:
-    """Note that tetrahedron `child`, which was appended, is a part of `parent`."""
+    """List tetrahedron `child`, which was appended, as a part of `parent`."""
     if change.n_children == len(change.children):
         change.lacks_room = LISTS
         return
@@ -170,3 +180,21 @@ def largest_frequency(body: Body, frequency_squared: FloatArray, nodes: IntArray
         if not body.fixed[nodes[i]]:
             largest = max(largest, frequency_squared[nodes[i]])
     return largest
+
+
+def room_for_a_pass(body: Body, factor: int = 1) -> tuple[int, int] | None:
+    """Return the numbers of nodes and tetrahedra to make room for before a pass; None to keep them.
+
+    Arrays double when they are nearly full.
+
+    Args:
+        body: The body.
+        factor: How many times as many nodes as usual may be doubled in the pass.
+    """
+    capacity = n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+    spare = 2 * SPARE_NODES * factor
+    if body.n_nodes + spare > n_nodes:
+        n_nodes = 2 * n_nodes + spare
+    if body.n_tetrahedra + ROOM_FOR_TETRAHEDRA > n_tetrahedra:
+        n_tetrahedra = 2 * n_tetrahedra + ROOM_FOR_TETRAHEDRA
+    return (n_nodes, n_tetrahedra) if (n_nodes, n_tetrahedra) != capacity else None

@@ -67,7 +67,7 @@ def grown_hanging(hanging: Hanging, n_nodes: int, n_tetrahedra: int) -> Hanging:
 
 @kernel
 def list_corners(hanging: Hanging, tetrahedra: IntArray) -> None:
-    """Note the four nodes of every tetrahedron."""
+    """List the four nodes of every tetrahedron."""
     for t in range(len(tetrahedra)):
         for k in range(4):
             join_list(hanging, tetrahedra[t, k], t, k)
@@ -75,14 +75,14 @@ def list_corners(hanging: Hanging, tetrahedra: IntArray) -> None:
 
 @kernel
 def join_list(hanging: Hanging, node: int, t: int, k: int) -> None:
-    """Note that `node` is the local node `k` of tetrahedron `t`."""
+    """List `node` as the local node `k` of tetrahedron `t`."""
     hanging.next[4 * t + k] = hanging.first[node]
     hanging.first[node] = 4 * t + k
 
 
 @kernel
 def leave_list(hanging: Hanging, node: int, t: int) -> None:
-    """Note that tetrahedron `t` is no longer around `node`."""
+    """Remove tetrahedron `t` from those around `node`."""
     before = _END
     corner = hanging.first[node]
     while corner != _END and corner // 4 != t:

@@ -13,8 +13,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, aligned
-from tissue.core.simd_gather import larger_bits
-from tissue.core.simd_rows import rows_of_three
+from tissue.core.simd_rows import larger_bits, rows_of_three
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import vec3
 from tissue.geometry.aabb import tetrahedron_box, widened
@@ -44,7 +43,7 @@ LOGGED = 256
 """Tetrahedra that `TetrahedronGrid.log` has room for."""
 
 _INSIDE = 1e-6
-"""How far within a cell its limits for a node are, per spacing: more than any rounding."""
+"""Distance of the limits for a node within a cell, per spacing: more than any rounding."""
 
 
 class TetrahedronGrid(Arrays):

@@ -7,19 +7,21 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
-from tissue.geometry.connected_components import components
-from tissue.mesh.crowded_nodes import crowding_of
 from tissue.mesh.faces import OUTWARD, SortedFaces, sorted_faces
 from tissue.mesh.mesh_arrays import MeshError as MeshError
 from tissue.mesh.mesh_arrays import mesh_arrays
+from tissue.mesh.pieces import components
+from tissue.mesh.star import LARGEST_STAR
 from tissue.types import TetrahedralMesh
 
 _logger = logging.getLogger("tissue")
 
 MAX_EXTENT = 1e3
 """A body larger than this [m] is in other units than metres."""
+
 MIN_EXTENT = 1e-5
 """A body smaller than this [m], the size of a cell, is in other units than metres."""
+
 USUAL_EXTENT = 1.0
 """A body larger than this [m] may well be in millimetres; no organ and no blade is that long."""
 
@@ -29,6 +31,7 @@ FLAT_QUALITY = 1e-4
 A tetrahedron whose nodes lie in a plane but for single precision has 1e-7; a cell of a grid that
 is 200 times as wide as high still has 4e-3.
 """
+
 SLIVER_QUALITY = 1e-2
 """Quality below which a tetrahedron forces short time steps and poor cuts."""
 
@@ -48,7 +51,7 @@ class CheckedMesh(NamedTuple):
     origin: IntArray
     """Node of the given mesh that each node was, shape (n_nodes,)."""
     warnings: tuple[str, ...]
-    """What was repaired, and what is doubtful."""
+    """Repairs, and doubtful things."""
 
 
 def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
@@ -289,6 +292,20 @@ def _refuse_wrong_faces(tetrahedra: IntArray, faces: SortedFaces) -> None:
             f"tetrahedra {a // 4} and {b // 4} overlap: both lie on the same side of their common "
             f"face {_face(tetrahedra, a)}. {_count(overlapping.size, 'such pair')}"
         )
+
+
+def crowding_of(tetrahedra: IntArray) -> str | None:
+    """Return what is wrong where more than `LARGEST_STAR` tetrahedra share a node; None: nothing.
+
+    `tetrahedra`: shape (n_tets, 4).
+    """
+    counts = np.bincount(tetrahedra.ravel())
+    if counts.max() <= LARGEST_STAR:
+        return None
+    return (
+        f"node {counts.argmax()} has {counts.max()} tetrahedra around it; there may be "
+        f"{LARGEST_STAR}. Mesh the body again: ordinary meshes have 60 at most"
+    )
 
 
 def _face(tetrahedra: IntArray, half: int) -> list[int]:

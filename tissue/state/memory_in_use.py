@@ -7,7 +7,7 @@ What is not named here is state as a whole. What is named saves time: the arrays
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from tissue.core.struct_memory import RowsInUse, StructRules
+from tissue.core.memory_blocks import RowsInUse, StructRules
 from tissue.core.structs import Arrays
 
 SCRATCH = frozenset(
@@ -83,7 +83,7 @@ _OF_NODES = {
         *("strained_frequency_squared", "dilatation_test", "frequency_test"),
     ),
     "Springs": ("first", "room", "count", "stiffness_per_mass", "frequency_squared"),
-    "CutSheet": ("node_stamp", "offset", "past_offset", "side", "nodes"),
+    "CutSurface": ("node_stamp", "offset", "past_offset", "side", "nodes"),
     "Stages": ("external", "loads"),
     "NodeMotion": (
         *("before", "reference", "displacement", "radius", "path", "moved_at", "self_proximity"),
@@ -104,7 +104,7 @@ _OF_NODES = {
 _OF_TETRAHEDRA = {
     "Body": ("tetrahedra", "links"),
     "Collapsing": ("stiffness", "limit", "per_volume"),
-    "CutSheet": ("tetrahedron_stamp", "tetrahedron_side"),
+    "CutSurface": ("tetrahedron_stamp", "tetrahedron_side"),
     "Faces": ("place", "piece"),
 }
 """Arrays with a row for each tetrahedron."""
@@ -154,7 +154,7 @@ def _of_one(struct: Arrays, body: Arrays) -> Iterable[RowsInUse]:
         yield from _of_solid(struct, body)
     elif kind == "SearchState":
         yield from _of_search(struct)
-    elif kind == "SideContacts":
+    elif kind == "FaceContacts":
         yield RowsInUse(struct, "row_of_face", (body, "n_tetrahedra"), elements=4)
 
 

@@ -11,9 +11,7 @@ from tissue.blade_shape import BladeShape
 from tissue.body_view import bounds_of_body
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.vec3 import Vec3
-from tissue.cutting.incision import Incision
-from tissue.cutting.scheme import checked_scheme
-from tissue.cutting.scheme_choice import scheme_of
+from tissue.cutting.incision import Incision, checked_scheme, scheme_of
 from tissue.cutting.snapping import EXPLAINED
 from tissue.integrators.global_stepper import GlobalStepper, integrator_of
 from tissue.integrators.methods import (

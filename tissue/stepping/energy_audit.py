@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.blade.blade_state import clear_works
 from tissue.blade.edge import Edge
-from tissue.blade.impulse_totals import clear_works
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.elasticity.energy import elastic_energy, kinetic_energy, potential_energy

@@ -15,7 +15,7 @@ from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms
 from tissue.geometry.aabb import empty_box, with_point
 from tissue.integrators.model import TissueModel
-from tissue.mesh.finite_motion import is_motion_finite
+from tissue.mesh.node_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
 """Energy that may come out of nothing, as a strain of the whole body: a tenth of the speed of waves

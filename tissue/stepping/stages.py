@@ -5,12 +5,10 @@ from time import perf_counter
 
 import numpy as np
 
-from tissue.blade.blade_context import NOT_ENGAGED, BladeContext
-from tissue.blade.edge import NOWHERE, Edge
-from tissue.blade.lazy_result import LazyResult
+from tissue.blade.blade_context import NOT_ENGAGED, BladeContext, LazyResult
+from tissue.blade.edge import NOWHERE, Edge, edge_of, edge_or_error
 from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
-from tissue.blade.sweep_checks import edge_of, edge_or_error
 from tissue.blade.toughness import expect_toughness_in_range
 from tissue.body_view import BodyChunks, bounds_of_body
 from tissue.core.array_types import FloatArray
@@ -28,10 +26,9 @@ from tissue.loads.handles import Handles
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import write_bounds
-from tissue.mesh.changes import ChangedMesh, Owner, touched_nodes
-from tissue.mesh.cut_error import path_error
+from tissue.mesh.changes import ChangedMesh, Owner, room_for_a_pass, touched_nodes
+from tissue.mesh.faces import path_error
 from tissue.mesh.star import Visits
-from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
 from tissue.stepping.energy_audit import Audit
 from tissue.types import Chunks, StageTimes, StepResult
@@ -48,7 +45,7 @@ class StepStages:
         integrator: Moves the nodes in a step; it may be the same.
         audit: The account of the energy.
         slit_reach: Distance from a cut face up to which a point is in the slit [m]
-            (`tissue.blade.engagement.is_in_slit`).
+            (`tissue.blade.edge_search.is_in_slit`).
     """
 
     def __init__(

@@ -120,7 +120,7 @@ def test_a_cut_edge_first_touches_the_skin_with_its_edge_alone():
     most = 0
     for sweep in strokes.sweeps(stroke):
         tissue.step(sweep, strokes.DT)
-        most = max(most, tissue._model.interaction.state.blunt.n_pressing)
+        most = max(most, tissue._model.interaction.state.spine.n_pressing)
     assert tissue.cut_report().n_cut_nodes > 20
     assert most == 0
 

@@ -20,8 +20,14 @@ from tissue import (
     TissueState,
 )
 from tissue.core.memento import Memento
-from tissue.core.memory_blocks import ADDRESS, HAS_REST, SPAN_LENGTH, measure_memory, words_at
-from tissue.core.struct_memory import memory_of
+from tissue.core.memory_blocks import (
+    ADDRESS,
+    HAS_REST,
+    SPAN_LENGTH,
+    measure_memory,
+    memory_of,
+    words_at,
+)
 from tissue.state import identity
 from tissue.state.tissue_state import RULES
 

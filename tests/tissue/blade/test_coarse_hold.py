@@ -5,15 +5,15 @@ import pytest
 
 from tests.tissue.kernels_of import line_blade
 from tissue import Material, block
-from tissue.blade.anchors import (
+from tissue.blade.coarse_hold import OVERHANG, fade_coarse_hold, move_coarse_hold
+from tissue.blade.edge import Edge
+from tissue.blade.edge_anchors import (
     anchor_position,
     holding_node,
     holding_weight,
     n_holding_nodes,
     new_anchors,
 )
-from tissue.blade.coarse_hold import OVERHANG, fade_coarse_hold, move_coarse_hold
-from tissue.blade.edge import Edge
 from tissue.blade.return_mapping import relocate, set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import build_body

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tissue import block
-from tissue.blade.anchors import new_anchors
-from tissue.blade.material_frame import BESIDE, way_at_rest
+from tissue.blade.edge_anchors import new_anchors
+from tissue.blade.material_frame import BESIDE, displacement_at_rest
 from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import CUT, build_body
@@ -43,7 +43,7 @@ def way(shear_left, shear_right, *, beside=1e-4, reach=REACH, is_parted=False):
     p = Vec3(MIDDLE + beside, 0.0101, 0.0102)
     t = tetrahedron_at(body, build_grid(body, body.rest, 0.0), body.rest, p)
     set_anchor(anchors, body, 0, t, p)
-    return np.array(way_at_rest(anchors, body, 0, Vec3(0.0, STEP, 0.0), X, reach))
+    return np.array(displacement_at_rest(anchors, body, 0, Vec3(0.0, STEP, 0.0), X, reach))
 
 
 @pytest.mark.parametrize("beside", [-1e-4, 1e-4, 2e-3])

@@ -13,8 +13,8 @@ import pytest
 
 import tissue
 from tissue.core import kernel_parts
-from tissue.core.cache_directory import cache_directory
 from tissue.core.jit import SameTypes, inlined, is_compiling, kernel
+from tissue.core.kernel_cache import cache_directory
 
 pytestmark = pytest.mark.kernel
 
@@ -23,7 +23,7 @@ PACKAGE = Path(tissue.__file__).parent
 
 def directory_of(package: Path, cache: str = "elsewhere") -> Path:
     """Return the cache directory that a copy of the package uses."""
-    program = "from tissue.core.cache_directory import cache_directory; print(cache_directory())"
+    program = "from tissue.core.kernel_cache import cache_directory; print(cache_directory())"
     done = subprocess.run(
         [sys.executable, "-c", program],
         cwd=package.parent,

@@ -3,9 +3,8 @@
 import numpy as np
 
 from tissue.core.memento import Memento, StateRules
-from tissue.core.memento_reading import put_to
-from tissue.core.memento_writing import written
-from tissue.core.struct_memory import RowsInUse, StructRules
+from tissue.core.memento_reading import put_to, written
+from tissue.core.memory_blocks import RowsInUse, StructRules
 from tissue.core.structs import Arrays, FloatCell, IntCell
 
 

@@ -20,7 +20,7 @@ from tissue.core.simd_blocks import (
     values_of_rows,
     width_of,
 )
-from tissue.core.simd_gather import larger, largest, where_larger
+from tissue.core.simd_rows import larger, largest, where_larger
 
 pytestmark = pytest.mark.kernel
 

@@ -5,8 +5,7 @@ import pytest
 
 from tissue.core.jit import kernel
 from tissue.core.simd import aligned
-from tissue.core.simd_blocks import load_block, store_block
-from tissue.core.simd_logarithm import logarithm
+from tissue.core.simd_blocks import load_block, logarithm, store_block
 
 
 @kernel

@@ -6,7 +6,6 @@ import time
 import numpy as np
 import pytest
 
-from tissue.core.atomics import pause
 from tissue.core.jit import is_compiling, kernel
 from tissue.core.thread_team import (
     LOOP_CHUNKS,
@@ -16,6 +15,7 @@ from tissue.core.thread_team import (
     items_of,
     new_team,
     open_loop,
+    pause,
     wait_for_others,
 )
 

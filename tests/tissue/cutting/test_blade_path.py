@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue.core.vec3 import Vec3
-from tissue.cutting.blade_path import Path, is_unswept, new_path, note_way
+from tissue.cutting.blade_path import Path, average_directions, is_unswept, new_path
 
 pytestmark = pytest.mark.kernel
 
@@ -23,7 +23,7 @@ def path_to(y: float, rise: float = 0.0) -> Path:
     for at in np.arange(0.0, y, 0.5) + 0.5:
         path.t1[:] = [[0.0, at, k + rise * at] for k in range(N)]
         path.t0[:] = path.t1 - [0.0, 0.5, 0.5 * rise]
-        note_way(path, 0.5)
+        average_directions(path, 0.5)
     return path
 
 
@@ -52,9 +52,9 @@ def test_the_way_of_a_tip_that_rises_was_lower_before(y):
 def test_a_tip_outside_the_tissue_has_no_way():
     path = path_to(2.0)
     path.member[0] = path.linked[0] = False
-    note_way(path, 0.5)
-    assert not path.way[0].any()
-    assert path.way[1] == pytest.approx([0.0, 1.0, 0.0])
+    average_directions(path, 0.5)
+    assert not path.direction[0].any()
+    assert path.direction[1] == pytest.approx([0.0, 1.0, 0.0])
 
 
 def test_a_tip_in_another_wall_says_nothing_of_this_one():

@@ -5,7 +5,7 @@ import pytest
 
 from tests.tissue.cutting import upright_edge
 from tissue.cutting.bridging import remember_active, resolve_bridges
-from tissue.cutting.cut_surface import note_side, on_sheet, side_of
+from tissue.cutting.cut_surface import note_side, on_cut_surface, side_of
 from tissue.mesh.changes import note_dirty
 
 pytestmark = pytest.mark.kernel
@@ -23,55 +23,55 @@ def corner(x: float, low: float = -1.0):
 
 def test_an_edge_between_both_sides_is_cut_where_the_cut_surface_crosses_it():
     cut = corner(0.5)
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 5
     np.testing.assert_allclose(cut.body.rest[4], [0.5, 0.0, 0.0])
-    assert on_sheet(cut.sheet, 4)
+    assert on_cut_surface(cut.surface, 4)
 
 
 def test_the_wrong_side_of_a_node_far_from_the_cut_surface_is_corrected():
     cut = corner(-0.5)  # the tetrahedron is wholly on side +1
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
-    assert side_of(cut.sheet, 0) == 1
+    assert side_of(cut.surface, 0) == 1
 
 
 def test_an_edge_that_the_blade_has_not_reached_is_no_bridge():
     cut = corner(0.5)
     cut.path.t1[:, 1] = -0.2  # edge 0-1 is at y = 0
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
-    assert not on_sheet(cut.sheet, 0)
-    assert not on_sheet(cut.sheet, 1)
+    assert not on_cut_surface(cut.surface, 0)
+    assert not on_cut_surface(cut.surface, 1)
 
 
 def test_a_node_on_the_wrong_side_but_near_the_cut_surface_is_put_on_it():
     cut = corner(-0.05)
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
-    assert on_sheet(cut.sheet, 0)
+    assert on_cut_surface(cut.surface, 0)
 
 
 def test_a_tetrahedron_beyond_the_tip_is_not_a_bridge():
     cut = corner(0.5, low=1.5)
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
 
 
 def test_a_tetrahedron_that_is_still_active_waits():
     cut = corner(0.5)
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     cut.scratch.n_active = 1
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4

@@ -10,7 +10,7 @@ from tests.tissue.kernels_of import cut_of
 from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.collision_detection import find_active_tetrahedra
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
-from tissue.cutting.cut_surface import on_sheet
+from tissue.cutting.cut_surface import on_cut_surface
 
 pytestmark = [
     pytest.mark.kernel,
@@ -41,8 +41,8 @@ def swept(y0: float, y1: float, low: float = DEPTH):
     return cut
 
 
-def nodes_on_sheet(cut) -> list[int]:
-    return [n for n in range(cut.body.n_nodes) if on_sheet(cut.sheet, n)]
+def nodes_on_cut_surface(cut) -> list[int]:
+    return [n for n in range(cut.body.n_nodes) if on_cut_surface(cut.surface, n)]
 
 
 def edges_of(cut) -> set[tuple[int, int]]:
@@ -61,7 +61,7 @@ def expect_sound(cut) -> None:
 def test_nodes_lie_where_the_tip_passed_faces_and_edges_join_them():
     cut = swept(-0.1, 0.45)
     extend_fronts(cut)
-    nodes = nodes_on_sheet(cut)
+    nodes = nodes_on_cut_surface(cut)
     along = sorted(nodes, key=lambda node: cut.body.rest[node, 1])
     assert len(along) >= 3
     rest = cut.body.rest[along]
@@ -76,30 +76,32 @@ def test_nodes_lie_where_the_tip_passed_faces_and_edges_join_them():
 def test_the_front_ends_at_the_last_face_that_the_tip_passed():
     cut = swept(-0.1, 0.45)
     extend_fronts(cut)
-    last = max(nodes_on_sheet(cut), key=lambda node: cut.body.rest[node, 1])
-    assert cut.sheet.front[0] == last
-    assert cut.sheet.front[1] == -1  # the heel is above the body
+    last = max(nodes_on_cut_surface(cut), key=lambda node: cut.body.rest[node, 1])
+    assert cut.surface.front[0] == last
+    assert cut.surface.front[1] == -1  # the heel is above the body
 
 
 def test_a_tip_that_leaves_at_the_far_side_leaves_no_front():
     cut = swept(-0.1, 1.1)
     extend_fronts(cut)
-    assert cut.sheet.front[0] == -1
-    assert cut.body.rest[nodes_on_sheet(cut), 1].max() == pytest.approx(1.0)
+    assert cut.surface.front[0] == -1
+    assert cut.body.rest[nodes_on_cut_surface(cut), 1].max() == pytest.approx(1.0)
 
 
 def test_a_tip_outside_the_body_makes_no_front():
     cut = swept(-0.1, 0.45, low=-0.2)
     extend_fronts(cut)
-    assert nodes_on_sheet(cut) == []
+    assert nodes_on_cut_surface(cut) == []
 
 
 def test_a_front_brought_to_a_resting_blade_runs_from_its_tip_to_the_skin():
     cut = swept(-0.1, 0.45)
     extend_fronts(cut)
-    before = set(nodes_on_sheet(cut))
+    before = set(nodes_on_cut_surface(cut))
     bring_front_to_blade(cut)
-    along_blade = sorted(set(nodes_on_sheet(cut)) - before, key=lambda node: cut.body.rest[node, 2])
+    along_blade = sorted(
+        set(nodes_on_cut_surface(cut)) - before, key=lambda node: cut.body.rest[node, 2]
+    )
     rest = cut.body.rest[along_blade]
     assert np.abs(rest[:, :2] - [X, 0.45]).max() < 0.12
     assert rest[-1, 2] == pytest.approx(1.0)

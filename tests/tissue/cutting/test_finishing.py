@@ -1,4 +1,5 @@
-"""Bridges that a blade passed over are parted where they are small, and where no crumb comes loose.
+"""Bridges that a blade passed over are parted where they are small, and where no fragment comes
+loose.
 
 The body is the block of 40 x 60 x 40 mm in cells of 10 mm. It is cut from y = 0 on along its middle
 plane, which is a plane of the mesh.
@@ -10,7 +11,7 @@ import pytest
 from tests.support import soundness
 from tissue import Tissue, block
 from tissue.blade.prescribed_cut import cut_along
-from tissue.cutting.finishing import MOST_PASSED, finish_sheet
+from tissue.cutting.finishing import MOST_PASSED, finish_cut_surface
 from tissue.mesh.body import CUT
 from tissue.mesh.changes import clear_changes
 
@@ -27,7 +28,7 @@ def cut_to(y, has_left=True):
     return tissue
 
 
-def test_a_bridge_of_a_tenth_of_the_sheet_is_parted():
+def test_a_bridge_of_a_tenth_of_the_cut_surface_is_parted():
     """5 mm of 60 are left, an eleventh of the 55 that were cut: the flat strip is the least."""
     tissue = cut_to(0.055)
     before = tissue.snapshot()
@@ -111,17 +112,17 @@ def neighbour_across(body, t, f):
     raise AssertionError("the face has no twin")
 
 
-def test_a_crumb_that_hangs_on_the_other_lip_is_not_cut_loose():
+def test_a_fragment_that_hangs_on_the_other_lip_is_not_cut_loose():
     """One tetrahedron of lip +1 is tied to lip -1, and to nothing else: its face is the least."""
     tissue = cut_to(0.07)
     incision, (body, visits) = tissue._stages.incision, tissue._stages.mesh()
     incision._cut_in_passes(incision.scheme.end, tissue._stages.hooks)
     cut = incision.scheme._arrays(body, visits, incision.path)
-    links, sheet = body.links, cut.sheet
+    links, surface = body.links, cut.surface
     crumb, f = next(
         (t, f)
         for t, f in np.argwhere(links[: body.n_tetrahedra] == CUT)
-        if sheet.tetrahedron_stamp[t] == sheet.number and sheet.tetrahedron_side[t] == 1
+        if surface.tetrahedron_stamp[t] == surface.number and surface.tetrahedron_side[t] == 1
     )
     for g in range(4):
         if links[crumb, g] >= 0:
@@ -131,7 +132,7 @@ def test_a_crumb_that_hangs_on_the_other_lip_is_not_cut_loose():
     links[crumb, f], links[other // 4, other % 4] = other, 4 * crumb + f
     before = links.copy()
     clear_changes(cut.change)
-    finish_sheet(cut, incision.scheme._graph, cut.change.area)
+    finish_cut_surface(cut, incision.scheme._graph, cut.change.area)
     np.testing.assert_array_equal(links, before)
     assert incision.finished_area == 0.0
     assert not incision.scheme._graph.lip.any()

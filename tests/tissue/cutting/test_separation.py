@@ -8,7 +8,7 @@ from tests.tissue.cutting.upright_edge import put_edge
 from tests.tissue.kernels_of import cut_of
 from tissue import block
 from tissue.cutting.cut_surface import decide_side, note_side
-from tissue.cutting.separation import open_sheet, tetrahedron_side
+from tissue.cutting.separation import open_cut_surface, tetrahedron_side
 from tissue.cutting.workspace import flag
 from tissue.mesh.body import CUT
 from tissue.mesh.changes import NODES, clear_changes
@@ -32,7 +32,7 @@ def mesh_of(cut):
 
 def test_faces_between_the_two_sides_of_the_cut_surface_are_cut_and_their_nodes_doubled():
     cut = two_halves()
-    open_sheet(cut)
+    open_cut_surface(cut)
     assert cut.change.n_faces == 2  # the square in the middle
     assert cut.body.n_nodes == 12 + 4
     assert soundness.n_pieces(mesh_of(cut)) == 2
@@ -46,17 +46,17 @@ def test_where_there_is_no_room_to_double_a_node_the_cut_says_so():
     arrays = {name: getattr(cut.body, name) for name in type(cut.body).__annotations__}
     short = {name: array[:n] for name, array in arrays.items() if np.shape(array)[:1] == (room,)}
     crowded = cut.replaced(body=cut.body.replaced(**short))
-    open_sheet(crowded)
+    open_cut_surface(crowded)
     assert crowded.body.n_nodes == 12 + 3
     assert crowded.change.lacks_room == NODES
     roomy = two_halves()
-    open_sheet(roomy)
+    open_cut_surface(roomy)
     assert roomy.change.lacks_room == 0
 
 
 def test_copies_have_the_position_of_the_node_and_refer_to_each_other():
     cut = two_halves()
-    open_sheet(cut)
+    open_cut_surface(cut)
     for copy in range(12, 16):
         node = cut.body.twin[copy]
         assert cut.body.twin[node] == copy
@@ -65,10 +65,10 @@ def test_copies_have_the_position_of_the_node_and_refer_to_each_other():
 
 def test_separating_an_open_cut_surface_again_changes_nothing():
     cut = two_halves()
-    open_sheet(cut)
+    open_cut_surface(cut)
     tetrahedra = mesh_of(cut).copy()
     clear_changes(cut.change)
-    open_sheet(cut)
+    open_cut_surface(cut)
     np.testing.assert_array_equal(mesh_of(cut), tetrahedra)
     assert cut.change.n_faces == 0
 
@@ -79,7 +79,7 @@ def test_a_face_with_a_node_off_the_cut_surface_is_not_cut():
     on = np.flatnonzero(cut.body.rest[:12, 0] == 0.5)
     for node in on[:2]:
         flag(cut, node)
-    open_sheet(cut)
+    open_cut_surface(cut)
     assert soundness.n_pieces(mesh_of(cut)) == 1
     assert cut.body.n_nodes == 12
 
@@ -94,7 +94,7 @@ def test_a_single_cut_face_inside_doubles_no_node():
     middle = [f for f in faces.nodes if (rest[f, 0] == 0.5).all() and 13 in f]
     for node in middle[0]:
         flag(cut, node)
-    open_sheet(cut)
+    open_cut_surface(cut)
     assert cut.change.n_faces == 1
     assert cut.body.n_nodes == 27
     assert (cut.body.links[: len(tetrahedra)] == CUT).sum() == 2
@@ -105,22 +105,22 @@ def test_the_last_face_of_a_tetrahedron_is_not_cut():
     put_edge(cut, 0.4)
     for node in (1, 2, 3):
         flag(cut, node)
-    open_sheet(cut)
+    open_cut_surface(cut)
     assert cut.change.n_faces == 0
     assert cut.body.n_nodes == 5
 
 
-def test_a_piece_smaller_than_a_crumb_stays_with_the_body():
+def test_a_piece_smaller_than_a_fragment_stays_with_the_body():
     cut = two_halves()
     cut = cut.replaced(limits=cut.limits.replaced(crumb=0.51))
-    open_sheet(cut)
+    open_cut_surface(cut)
     assert soundness.n_pieces(mesh_of(cut)) == 1
     assert cut.body.n_nodes == 12
 
 
 def test_links_after_a_cut_are_those_built_from_scratch():
     cut = two_halves()
-    open_sheet(cut)
+    open_cut_surface(cut)
     links = cut.body.links[: len(mesh_of(cut))]
     np.testing.assert_array_equal(np.maximum(links, -1), naive.links(mesh_of(cut)))
 
@@ -128,32 +128,32 @@ def test_links_after_a_cut_are_those_built_from_scratch():
 # The side of a tetrahedron.
 
 
-def one_tetrahedron(*on_sheet: int):
+def one_tetrahedron(*on_cut_surface: int):
     """Return the corner of a cube with the given nodes on the cut surface at x = 0.3."""
     cut = cut_of(bodies.unit_tetrahedron())
     put_edge(cut, 0.3)
-    for node in on_sheet:
+    for node in on_cut_surface:
         flag(cut, node)
     return cut
 
 
 def test_a_decided_side_stays():
     cut = one_tetrahedron(0, 2, 3)
-    decide_side(cut.sheet, 0, -1)
+    decide_side(cut.surface, 0, -1)
     assert tetrahedron_side(cut, 0) == -1
 
 
 def test_the_noted_side_of_a_node_outweighs_its_position():
     cut = one_tetrahedron(0, 2, 3)
     assert tetrahedron_side(cut, 0) == 1  # node 1 is at x = 1
-    note_side(cut.sheet, 1, -1, True)
+    note_side(cut.surface, 1, -1, True)
     assert tetrahedron_side(cut, 0) == -1
 
 
 def test_a_tetrahedron_with_nodes_noted_on_both_sides_is_undecided():
     cut = one_tetrahedron(2, 3)
-    note_side(cut.sheet, 0, -1, True)
-    note_side(cut.sheet, 1, 1, True)
+    note_side(cut.surface, 0, -1, True)
+    note_side(cut.surface, 1, 1, True)
     assert tetrahedron_side(cut, 0) == 0
 
 

@@ -7,7 +7,7 @@ from tests.support.bodies import jittered
 from tissue.core.simd import room_for_points
 from tissue.forces.rigid_motion import add_rigid_part, rigid_motion
 from tissue.mesh.body import build_body
-from tissue.mesh.loose_pieces import LoosePieces, loose_pieces_of
+from tissue.mesh.pieces import LoosePieces, loose_pieces_of
 
 pytestmark = pytest.mark.kernel
 

@@ -76,7 +76,7 @@ def test_side_contacts_that_run_out_of_room_change_nothing(monkeypatch):
     stroke = strokes.slanted(MESH)
     ample = body(blade=BladeShape())
     expected = fingerprint(ample, strokes.make(ample, stroke))
-    monkeypatch.setattr("tissue.blade.side_contact._FACES_AT_FIRST", 1)
+    monkeypatch.setattr("tissue.blade.faces_contact._FACES_AT_FIRST", 1)
     tight = body(blade=BladeShape())
     assert len(tight._model.interaction.state.sides.face) == 1
     assert fingerprint(tight, strokes.make(tight, stroke)) == expected

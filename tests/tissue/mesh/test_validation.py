@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue import MeshError, TetrahedralMesh, block
-from tissue.geometry.connected_components import components
+from tissue.mesh.pieces import components
 from tissue.mesh.validation import checked, expect_sound, quality, signed_volumes
 
 CORNERS = 0.01 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

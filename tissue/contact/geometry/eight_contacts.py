@@ -10,8 +10,14 @@ from tissue.contact.geometry.edges import EDGE_END
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined
 from tissue.core.simd import Lanes, lanes, square_root
-from tissue.core.simd_gather import larger, larger_bits, where_larger
-from tissue.core.simd_rows import points_of_column, rows_of_four, rows_of_three
+from tissue.core.simd_rows import (
+    larger,
+    larger_bits,
+    points_of_column,
+    rows_of_four,
+    rows_of_three,
+    where_larger,
+)
 from tissue.core.vec3 import Vec3, axpy, cross, dot, scale, sub
 
 TINY = 1e-300

@@ -29,7 +29,7 @@ from tissue.contact.response.contacts import (
 from tissue.contact.search.near_pairs import CONTACT_REACH, PairTests, know_motion, sort_by_faces
 from tissue.contact.search.search_state import SearchState, are_many_moving
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.vec3 import Vec3, dot, norm, store, sub, vec3
 from tissue.mesh.body import Body
 

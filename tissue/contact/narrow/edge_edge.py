@@ -33,7 +33,7 @@ from tissue.contact.search.search_state import SearchState
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, filled, lanes, square_root, store_lanes
-from tissue.core.simd_gather import larger, larger_bits, where_larger
+from tissue.core.simd_rows import larger, larger_bits, where_larger
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 from tissue.mesh.body import Body
 

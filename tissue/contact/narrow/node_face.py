@@ -19,8 +19,7 @@ from tissue.contact.search.search_state import SearchState
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, lanes, load_lanes, square_root, store_lanes, unfused
-from tissue.core.simd_gather import larger, larger_bits, natural, where_larger
-from tissue.core.simd_rows import store_rows_of_four
+from tissue.core.simd_rows import larger, larger_bits, natural, store_rows_of_four, where_larger
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 from tissue.mesh.body import Body
 

@@ -30,11 +30,14 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, lanes, load_lanes, square_root, store_lanes
 from tissue.core.simd_blocks import sum_of_lanes
-from tissue.core.simd_gather import larger, larger_bits, largest, where_larger
 from tissue.core.simd_rows import (
     add_to_row,
+    larger,
+    larger_bits,
+    largest,
     store_rows_of_four,
     store_rows_of_three,
+    where_larger,
 )
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, scale, sub, vec3
 

@@ -30,7 +30,7 @@ from tissue.contact.geometry.eight_contacts import TINY, Four, FourPoints, combi
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, lanes
-from tissue.core.simd_gather import larger, larger_bits, where_larger
+from tissue.core.simd_rows import larger, larger_bits, where_larger
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, scale, store, sub, vec3
 

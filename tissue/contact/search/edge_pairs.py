@@ -22,7 +22,7 @@ from tissue.contact.search.node_motion import NodeMotion
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, aligned, eight_points, filled, lanes, load_lanes
-from tissue.core.simd_gather import larger, larger_bits
+from tissue.core.simd_rows import larger, larger_bits
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, store, sub, vec3
 from tissue.geometry.aabb import box_at, segment_box, store_box, widened

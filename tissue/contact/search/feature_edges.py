@@ -25,7 +25,7 @@ from tissue.contact.search.node_grid import (
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, aligned, filled, lanes, load_lanes, room_for_points
-from tissue.core.simd_gather import larger, larger_bits
+from tissue.core.simd_rows import larger, larger_bits
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, add, norm, scale, store, sub, vec3
 from tissue.geometry.aabb import Aabb, box_at, empty_box, with_point

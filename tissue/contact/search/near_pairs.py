@@ -13,7 +13,7 @@ from tissue.contact.search.node_motion import NodeMotion
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, aligned, filled
-from tissue.core.simd_gather import natural
+from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import grown
 

@@ -13,7 +13,7 @@ from tissue.contact.search.node_motion import BALL, NodeMotion
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, aligned, filled, lanes, load_lanes
-from tissue.core.simd_gather import first_bit, larger, larger_bits, natural
+from tissue.core.simd_rows import first_bit, larger, larger_bits, natural
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, norm, store, vec3
 from tissue.geometry.aabb import Aabb, empty_box, widened, with_point

@@ -13,15 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.cutting.bielser_1998.cut_edge_code import (
+from tissue.cutting.bielser_1998.template_1_to_17 import (
     CORNERS,
     FACES,
+    FIRST_J,
     N_CODES,
     code_of,
     edge_named,
     face_named,
 )
-from tissue.cutting.bielser_1998.template_1_to_17 import FIRST_J
 
 CASES = "ABCDE"
 

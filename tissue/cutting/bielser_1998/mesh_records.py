@@ -10,8 +10,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.cutting.bielser_1998.case_table import LOOKUP
-from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES, bit_of
-from tissue.cutting.bielser_1998.template_1_to_17 import PRESPLIT
+from tissue.cutting.bielser_1998.template_1_to_17 import EDGES, FACES, PRESPLIT, bit_of
 from tissue.mesh.body import Body
 from tissue.mesh.faces import sorted_faces
 from tissue.mesh.nonconforming import may_hang
@@ -30,7 +29,7 @@ class Records(Arrays):
     tetrahedra: IntArray
     """Nodes A, B, C, D of each tetrahedron, shape (n_tets, 4)."""
     links: IntArray
-    """What is behind each face, as `Body.links` before the first cut; shape (n_tets, 4)."""
+    """Half-faces behind each face, as `Body.links` before the first cut; shape (n_tets, 4)."""
     first_child: IntArray
     """First appended child, or WHOLE_STILL; child 0 replaces its parent; shape (n_tets,)."""
     edges_of: IntArray

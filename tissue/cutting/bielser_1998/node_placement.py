@@ -18,7 +18,6 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3
-from tissue.cutting.bielser_1998.cut_edge_code import is_edge_cut
 from tissue.cutting.bielser_1998.mesh_records import (
     NO_NODE,
     NOT_CUT,
@@ -31,6 +30,7 @@ from tissue.cutting.bielser_1998.template_1_to_17 import (
     EDGE_NODE,
     FACE_NODE,
     N_LOCAL_NODES,
+    is_edge_cut,
 )
 from tissue.geometry.tetrahedron import signed_volume
 

@@ -7,24 +7,31 @@ does not support stays uncut and is counted; see `SchemeStatistics`.
 
 import numpy as np
 
+from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.cutting.bielser_1998.crossings import (
-    Waiting,
-    has_left,
-    list_waiting,
-    record_crossings,
-    record_tips,
+from tissue.core.structs import Arrays, IntCell
+from tissue.cutting.bielser_1998.case_table import CASES
+from tissue.cutting.bielser_1998.mesh_records import (
+    NO_NODE,
+    NOT_CUT,
+    WHOLE_STILL,
+    Records,
+    Table,
+    cut_edge_code,
+    edge_between,
+    is_whole,
+    records_of,
+    reference_at_face,
+    table,
 )
-from tissue.cutting.bielser_1998.mesh_records import cut_edge_code, records_of, table
 from tissue.cutting.bielser_1998.node_placement import new_placing
-from tissue.cutting.bielser_1998.statistics import statistics
-from tissue.cutting.bielser_1998.subdivision import split_tetrahedron
-from tissue.cutting.bielser_1998.template_1_to_17 import N_LOCAL_NODES
-from tissue.cutting.bielser_1998.workspace import Split, no_counts
+from tissue.cutting.bielser_1998.subdivision import Split, SplitCounts, no_counts, split_tetrahedron
+from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN, N_LOCAL_NODES, bit_of
 from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
 from tissue.cutting.collision_detection import detect_collisions
-from tissue.cutting.cut_surface import grown_sheet, new_sheet
+from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, line_of_sample, next_event
+from tissue.cutting.cut_surface import grown_cut_surface, new_cut_surface
 from tissue.cutting.workspace import (
     Cut,
     SnapLimits,
@@ -33,6 +40,7 @@ from tissue.cutting.workspace import (
 )
 from tissue.mesh.body import Body
 from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the_room
+from tissue.mesh.nonconforming import HANGING
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
@@ -46,10 +54,21 @@ GONE = -1.0
 """In place of a distance: the blade has left every tetrahedron, wherever it is."""
 
 
+class Waiting(Arrays):
+    """Tetrahedra of which the blade has cut an edge and that it has not left yet."""
+
+    tetrahedra: IntArray
+    """The waiting tetrahedra, shape (n_tets,)."""
+    n_listed: IntCell
+    """Number of tetrahedra in the list."""
+    is_listed: IntArray
+    """Whether a tetrahedron is in the list, shape (n_tets,)."""
+
+
 class PaperScheme:
     """The paper's scheme, with its records of the initial mesh and scratch.
 
-    The methods are those of `tissue.cutting.scheme.Scheme`.
+    The methods are those of `tissue.cutting.incision.Scheme`.
 
     Args:
         body: The body, uncut, with room for hanging nodes.
@@ -73,9 +92,9 @@ class PaperScheme:
         self._placing = new_placing()
         self._references = np.zeros((5, N_LOCAL_NODES), np.int64)
         self._counts = no_counts()
-        # For collision detection. The sheet stays empty: this scheme moves no node to it.
+        # For collision detection. The cut surface stays empty: this scheme moves no node to it.
         self._scratch = new_cut_scratch(0)
-        self._sheet = new_sheet(len(body.rest), len(body.tetrahedra))
+        self._surface = new_cut_surface(len(body.rest), len(body.tetrahedra))
         self._limits = SnapLimits(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
 
     @property
@@ -131,7 +150,7 @@ class PaperScheme:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
+        self._surface = grown_cut_surface(self._surface, n_nodes, n_tetrahedra)
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return counts of what was done so far."""
@@ -153,7 +172,7 @@ class PaperScheme:
         return Cut(
             body=body,
             visits=visits,
-            sheet=self._sheet,
+            surface=self._surface,
             path=path,
             change=self.change,
             scratch=self._scratch,
@@ -181,3 +200,128 @@ def split_left(s: Split, waiting: Waiting, path: Path, reach: float) -> None:
         else:
             waiting.is_listed[t] = 0
     waiting.n_listed = n
+
+
+@kernel
+def record_crossings(cut: Cut, records: Records) -> int:
+    """Record the crossed edges of the initial mesh; return how many others were crossed.
+
+    Others are ignored: "each tetrahedron can only be processed once" (section 6). An edge that is
+    crossed a second time in one incision has both ends on one side again, and is not cut: a blade
+    that moves along an edge trembles from one side of it to the other.
+    """
+    scratch = cut.scratch
+    n_ignored = 0
+    for i in range(scratch.n_crossings):
+        e = edge_between(records, scratch.crossing[i, 0], scratch.crossing[i, 1])
+        if e < 0:
+            n_ignored += 1
+        elif records.crossed_at[e] == NOT_CUT:
+            records.crossed_at[e] = scratch.crossing_at[i, 0]
+            records.crossed_in[e] = records.incision
+        elif records.crossed_in[e] == records.incision and records.edge_nodes[e, 0] == NO_NODE:
+            records.crossed_at[e] = NOT_CUT
+    return n_ignored
+
+
+@kernel
+def record_tips(cut: Cut, records: Records) -> None:
+    """Record where the ends of the blade passed through faces of whole tetrahedra."""
+    last = len(cut.path.seed) - 1
+    for end in range(2):
+        sample = 0 if end == 0 else last
+        if cut.path.member[sample]:
+            _record_tip(cut, records, sample)
+
+
+@kernel
+def _record_tip(cut: Cut, records: Records, sample: int) -> None:
+    line = line_of_sample(cut.path, sample)
+    when = 0.0
+    for _ in range(MOST_EVENTS):
+        event = next_event(cut, line, when)
+        if event.when > 1.0:
+            return
+        when = event.when + PARAMETER_GAP
+        t = event.half // 4
+        if not is_whole(records, t):
+            continue
+        face = records.faces_of[t, event.half % 4]
+        total = max(event.weights.x, 0.0) + max(event.weights.y, 0.0) + max(event.weights.z, 0.0)
+        for c in range(3):
+            node = event.a if c == 0 else (event.b if c == 1 else event.c)
+            place = reference_at_face(records, face, node)
+            records.tip_weights[face, place] = max(event.weights[c], 0.0) / total
+
+
+@kernel
+def list_waiting(cut: Cut, records: Records, waiting: Waiting) -> None:
+    """Add the active tetrahedra of which the blade has cut an edge to the waiting ones."""
+    scratch = cut.scratch
+    for i in range(scratch.n_active):
+        t = scratch.active[i]
+        if is_whole(records, t) and waiting.is_listed[t] == 0 and cut_edge_code(records, t) != 0:
+            waiting.is_listed[t] = 1
+            waiting.tetrahedra[waiting.n_listed] = t
+            waiting.n_listed += 1
+
+
+@kernel
+def has_left(body: Body, path: Path, t: int, reach: float) -> bool:
+    """Return whether the edge, where it is now, is farther than `reach` [m] from the box of `t`."""
+    grid = body.lattice_rest
+    margin = int(reach / body.lattice.spacing)
+    a = body.tetrahedra[t, 0]
+    b = body.tetrahedra[t, 1]
+    c = body.tetrahedra[t, 2]
+    d = body.tetrahedra[t, 3]
+    for k in range(len(path.linked) - 1):
+        if not path.linked[k] or reach < 0.0:
+            continue
+        is_near = True
+        for x in range(3):
+            low = min(min(grid[a, x], grid[b, x]), min(grid[c, x], grid[d, x]))
+            high = max(max(grid[a, x], grid[b, x]), max(grid[c, x], grid[d, x]))
+            p = path.lattice_t1[k, x]
+            q = path.lattice_t1[k + 1, x]
+            is_near = is_near and min(p, q) <= high + margin and max(p, q) >= low - margin
+        if is_near:
+            return False
+    return True
+
+
+def statistics(
+    body: Body, records: Records, table: Table, waiting: Waiting, counts: SplitCounts
+) -> SchemeStatistics:
+    """Return what the scheme did so far and what it left behind, in O(initial mesh).
+
+    Args:
+        body: The body as it is now.
+        records: Records of the initial mesh.
+        table: The lookup table.
+        waiting: Tetrahedra that the blade has not left.
+        counts: Counts since the body was made.
+    """
+    is_split = records.first_child != WHOLE_STILL
+    codes = np.zeros(len(is_split), np.int64)
+    for e in range(6):
+        is_edge_cut = records.crossed_at[records.edges_of[:, e]] != NOT_CUT
+        codes |= is_edge_cut.astype(np.int64) << bit_of(e)
+    unsupported = ~is_split & (codes > 0) & (table.case[codes] < 0) & (waiting.is_listed == 0)
+    beside_whole = np.zeros(len(records.edges), dtype=bool)
+    beside_whole[records.edges_of[~is_split]] = True
+    has_node = records.edge_nodes[:, 0] != NO_NODE
+    hanging_faces = np.unique(body.links[: len(is_split)][body.links[: len(is_split)] <= HANGING])
+    n_cut = int(is_split.sum())
+    return SchemeStatistics(
+        n_cut=n_cut,
+        n_of_case={case: int(counts.n_of_case[i]) for i, case in enumerate(CASES)},
+        paper_count=len(is_split) + N_CHILDREN * n_cut,
+        n_hanging_edge_nodes=int((has_node & beside_whole).sum()),
+        n_hanging_face_nodes=len(hanging_faces) + counts.n_own,
+        n_guarded=counts.n_guarded,
+        n_own_face_nodes=counts.n_own,
+        n_unsupported=int(unsupported.sum()),
+        n_waiting=waiting.n_listed,
+        n_ignored_crossings=counts.n_ignored,
+    )

@@ -1,6 +1,10 @@
-"""The generic 1:17 split of a tetrahedron (paper, section 4.2 and Figures 4 and 5).
+"""The cut-edge code and the generic 1:17 split of a tetrahedron (paper, sections 3 and 4.2).
 
-It has 14 nodes: the four corners, one on each edge and one in each face, none in the middle. Its 17
+The corners A, B, C, D are the local nodes 0 to 3. The code has a bit for each edge, set where the
+blade has crossed it, in the printed order AB BC BD AC CD AD, with AB the most significant: 48 =
+110000 of Figure 7 is AB and BC. The split is that of Figures 4 and 5.
+
+The split has 14 nodes: the four corners, one on each edge and one in each face. Its 17
 tetrahedra make five parts: the one of a corner holds the corner's core and three tetrahedra along
 the edges that leave it; the fifth is the centre.
 
@@ -17,25 +21,69 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES
+from tissue.core.jit import kernel
+
+CORNERS = "ABCD"
+
+EDGES = ((0, 1), (1, 2), (1, 3), (0, 2), (2, 3), (0, 3))
+"""Corners of each edge, in the order of the bits."""
+
+FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))
+"""Corners of each face. Face k lies opposite corner k, as everywhere in `tissue`."""
+
+N_CODES = 64
+"""Number of codes: 6 bits."""
+
+
+def code_of(*edges: str) -> int:
+    """Return the code of the edges with these names, for example "AB" and "BC".
+
+    The table of cases is made of codes as it is imported, so no kernel is called for its bits.
+    """
+    numbers = {edge_named(name) for name in edges}
+    return int("".join("1" if edge in numbers else "0" for edge in range(len(EDGES))), 2)
+
+
+def edge_named(name: str) -> int:
+    """Return the number of the edge with that name: two corners, in either order."""
+    a, b = sorted(CORNERS.index(corner) for corner in name)
+    return EDGES.index((a, b))
+
+
+def face_named(name: str) -> int:
+    """Return the number of the face with that name: three corners."""
+    return FACES.index(tuple(sorted(CORNERS.index(corner) for corner in name)))
+
+
+@kernel
+def bit_of(edge: int) -> int:
+    """Place of the bit of an edge, counted from the least significant."""
+    return 5 - edge
+
+
+@kernel
+def is_edge_cut(code: int, edge: int) -> bool:
+    """Return whether an edge is cut, by the code of its tetrahedron."""
+    return (code >> bit_of(edge)) & 1 == 1
+
 
 N_CHILDREN = 17
 """Tetrahedra that one becomes."""
+
 N_LOCAL_NODES = 14
 """Nodes of the split: corners, one on each edge, one in each face."""
+
 EDGE_NODE, FACE_NODE = 4, 10
 """Local numbers of the first edge node and the first face node; the corners are 0 to 3."""
 
 CENTRE = 4
 """The part that belongs to no corner."""
+
 CENTRE_CHILD = 16
 """The child that is the centre."""
 
 FIRST_J = 6
 """Number of the first triangle J. Before it come those I, in the order of the code's bits."""
-
-SUB_FACES = 6
-"""Triangles into which each face of the tetrahedron falls."""
 
 
 class Presplit(NamedTuple):

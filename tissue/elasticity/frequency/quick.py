@@ -14,7 +14,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import alike, gathered_alike, load_block, store_block, width_of
-from tissue.core.simd_gather import any_above, larger, largest, where_larger
+from tissue.core.simd_rows import any_above, larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, cross, dot
 from tissue.elasticity.finite_elements import Solid, n_blocks
 from tissue.elasticity.internal_forces import Elastic

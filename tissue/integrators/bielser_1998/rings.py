@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tissue.blade.anchors import ANCHORED, holding_node, n_holding_nodes
 from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import PRESSING
+from tissue.blade.edge_anchors import ANCHORED, holding_node, n_holding_nodes
+from tissue.blade.spine_contact import PRESSING
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
@@ -102,7 +102,7 @@ def find_held(held: Rings, body: Body, blade: BladeState) -> None:
 
     The nodes of the anchor nearest to the tip come first. Without any, `held` stays as it was.
     """
-    anchors, sides, blunt = blade.anchors, blade.sides, blade.blunt
+    anchors, sides, spine = blade.anchors, blade.sides, blade.spine
     n = 0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
@@ -117,14 +117,14 @@ def find_held(held: Rings, body: Body, blade: BladeState) -> None:
         n += 1
         for corner in range(3):
             add_focus(held, sides.node[i, corner])
-    if blunt.n_pressing > 0:
-        for k in range(len(blunt.state)):
-            if blunt.state[k] >= PRESSING:
+    if spine.n_pressing > 0:
+        for k in range(len(spine.state)):
+            if spine.state[k] >= PRESSING:
                 if n == 0:
                     begin_search(held)
                 n += 1
                 for q in range(N_CORNERS):
-                    add_focus(held, body.tetrahedra[blunt.tetrahedron[k], q])
+                    add_focus(held, body.tetrahedra[spine.tetrahedron[k], q])
 
 
 @kernel

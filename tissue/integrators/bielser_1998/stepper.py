@@ -24,7 +24,7 @@ from tissue.integrators.stability import largest_stable_step
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
+from tissue.mesh.node_motion import Moved, grown_moved, none_moved, note_moved
 
 
 class HierarchicalStepper:

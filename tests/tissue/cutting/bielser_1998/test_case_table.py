@@ -12,18 +12,17 @@ from tissue.cutting.bielser_1998.case_table import (
     reference,
     triangle_of,
 )
-from tissue.cutting.bielser_1998.cut_edge_code import (
+from tissue.cutting.bielser_1998.template_1_to_17 import (
     CORNERS,
+    EDGE_NODE,
     EDGES,
+    FACE_NODE,
     FACES,
-    FULL,
-    TIP,
-    WHOLE,
+    N_CHILDREN,
+    PRESPLIT,
     code_of,
-    face_state,
     is_edge_cut,
 )
-from tissue.cutting.bielser_1998.template_1_to_17 import EDGE_NODE, FACE_NODE, N_CHILDREN, PRESPLIT
 
 pytestmark = pytest.mark.kernel
 
@@ -44,6 +43,9 @@ CODES = {
     "D": "110000 101000 100100 100001 011000 010100 010010 001010 001001 000110 000101 000011",
     "E": "110010 110001 101100 101010 100110 100011 011100 011001 010101 010011 001110 001101",
 }
+
+WHOLE, TIP, FULL = 0, 1, 2
+"""State of a face by its cut edges: not cut; cut up to a point inside it; cut across."""
 
 SIGNATURES = {
     # opened triangles, corners in each piece, copies of edge nodes and of face nodes, face states
@@ -109,7 +111,9 @@ def test_each_case_has_one_signature(code):
     pieces = tuple(sorted(len(corners_of(g)) for g in groups(range(N_CHILDREN), code)))
     edge_copies = sum(len(groups_at(EDGE_NODE + e, code)) - 1 for e in range(6))
     face_copies = sum(len(groups_at(FACE_NODE + k, code)) - 1 for k in range(4))
-    states = Counter(face_state(code, k) for k in range(4))
+    states = Counter(
+        sum(is_edge_cut(code, e) for e, ends in enumerate(EDGES) if k not in ends) for k in range(4)
+    )
     signature = (opened, pieces, edge_copies, face_copies, states)
     assert signature == SIGNATURES[TABLE[code].case]
 

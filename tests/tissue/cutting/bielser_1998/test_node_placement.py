@@ -6,7 +6,6 @@ import pytest
 from tests.support import bodies
 from tests.tissue.cutting.bielser_1998.splits import splits_of
 from tissue.cutting.bielser_1998.case_table import TABLE
-from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES, code_of
 from tissue.cutting.bielser_1998.node_placement import (
     EDGE_MARGIN,
     LEAST_CENTRE,
@@ -17,8 +16,11 @@ from tissue.cutting.bielser_1998.node_placement import (
 from tissue.cutting.bielser_1998.template_1_to_17 import (
     CENTRE_CHILD,
     EDGE_NODE,
+    EDGES,
     FACE_NODE,
+    FACES,
     PRESPLIT,
+    code_of,
     generic_weights,
 )
 

@@ -10,8 +10,8 @@ from tissue.blade.blade_state import SEARCH
 from tissue.blade.return_mapping import locate
 from tissue.core.vec3 import Vec3
 from tissue.cutting.bielser_1998.case_table import TABLE
-from tissue.cutting.bielser_1998.cut_edge_code import EDGES, is_edge_cut
 from tissue.cutting.bielser_1998.subdivision import split_tetrahedron
+from tissue.cutting.bielser_1998.template_1_to_17 import EDGES, is_edge_cut
 from tissue.mesh.body import OUTER, behind, n_behind
 from tissue.mesh.nonconforming import HANGING
 from tissue.mesh.pieces import label_pieces

@@ -7,7 +7,7 @@ import pytest
 
 from tests.tissue.integrators.networks import block, found_nodes, rings_around
 from tests.tissue.kernels_of import line_blade
-from tissue.blade.anchors import ANCHORED, new_anchors
+from tissue.blade.edge_anchors import ANCHORED, new_anchors
 from tissue.integrators.bielser_1998.rings import (
     UNREACHED,
     add_focus,
