@@ -13,19 +13,20 @@ from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.explanation import OF_BLADE, explanation_of, frame_to_explain
 from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.output.killed_runs import kill_in, perform_in
+from tissue import BladeShape
 
-FRAME = 260
-"""Frame that is explained, in which the blade cuts."""
+FRAME = 625
+"""Frame that is explained, in which the edge cuts and the faces press."""
 
 AT = 1e-3 * (FRAME - 1)
 
-SLAB = changed(SCENES["slab"], seconds=0.3)
+SCENE = changed(SCENES["grid2"], seconds=0.7, stretch=0.0, blade=BladeShape(thickness=0.001))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("whole")
-    perform_in(path, SLAB)
+    perform_in(path, SCENE)
     return path
 
 
@@ -91,13 +92,13 @@ def test_the_command_prints_all_as_json_and_changes_no_file(folder, found, capsy
 def test_tables_show_the_largest_forces_of_a_kind_and_the_sum_of_the_others(folder, capsys):
     assert command_line(["explain", str(folder), "--at", str(AT)]) == EXIT_OK
     out = capsys.readouterr().out
-    assert f"frame {FRAME} of slab, from {AT:g} s" in out
+    assert f"frame {FRAME} of grid2, from {AT:g} s" in out
     for words in ("Edge of the blade", "Faces of the blade", "Supports", "more, together"):
         assert words in out
 
 
 def test_a_run_that_was_killed_is_explained_from_its_checkpoint(tmp_path, found, capsys):
-    kill_in(tmp_path, SLAB, 290)
+    kill_in(tmp_path, SCENE, 690)
     before = sums_of(tmp_path)
     printed = json_of(tmp_path, capsys)
     assert sums_of(tmp_path) == before
