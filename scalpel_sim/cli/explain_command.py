@@ -25,7 +25,7 @@ LEAST_FORCE = 5e-4
 _MM_PER_M = 1e3
 
 _TITLES = {
-    "edge": "Edge of the blade: anchors (stretch; what they must exceed)",
+    "edge": "Anchors of the edge of the blade",
     "face": "Faces of the blade",
     "back": "Back of the blade",
     "end": "Ends of the blade",
@@ -55,7 +55,7 @@ def explain(folder: Path, /, *, at: float, printing: PrintOptions = PrintOptions
 
     Args:
         folder: What `run` or `view` wrote, also one that was interrupted.
-        at: Simulated time at which the frame begins [s], as in forces.csv.
+        at: Simulated time at which the frame begins, or that is in it [s], as in forces.csv.
     """
     with log_to_stderr(printing):
         from scalpel_sim.runs.explanation import explanation_of, frame_to_explain
@@ -134,29 +134,32 @@ def _lines_on_bridge(found: "Explanation") -> list[str]:
 
 
 def _print_table(title: str, forces: "list[ActingForce]", console: "Console") -> None:
-    """Print the largest forces of one kind, and the sum of the others."""
+    """Print the largest forces of one kind, and the sum of the others, in 80 columns."""
+    from rich import box
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    shown = forces[:MOST_ROWS]
+    is_edge = forces[0].kind == "edge"
+    columns = {
+        "force N": [float(np.linalg.norm(each.force)) for each in shown],
+        "friction N": [math.nan if is_edge else each.friction for each in shown],
+        "slips at N" if is_edge else "limit N": [each.limit for each in shown],
+        "stretch mm" if is_edge else "depth mm": [_MM_PER_M * each.depth for each in shown],
+    }
+    # What is known of none has no column.
+    columns = {name: values for name, values in columns.items() if np.isfinite(values).any()}
     for heading in ("name", "state"):
         table.add_column(heading)
-    for heading in ("force N", "x N", "y N", "z N", "friction N", "limit N", "depth mm", "at mm"):
+    for heading in (*columns, "at mm"):
         table.add_column(heading, justify="right")
-    for each in forces[:MOST_ROWS]:
-        table.add_row(
-            each.name,
-            each.state,
-            f"{np.linalg.norm(each.force):.4f}",
-            *(f"{part:.4f}" for part in each.force),
-            _number(each.friction),
-            _number(each.limit),
-            _number(_MM_PER_M * each.depth),
-            " ".join(f"{_MM_PER_M * part:.1f}" for part in each.point),
-        )
+    for each, *numbers in zip(shown, *columns.values(), strict=True):
+        at = " ".join(f"{_MM_PER_M * part:.1f}" for part in each.point)
+        table.add_row(each.name, each.state, *map(_number, numbers), at)
     console.print(table)
     rest = forces[MOST_ROWS:]
     if rest:
-        console.print(f"and {len(rest)} more, together {_size_of(rest):.4f} N", highlight=False)
+        console.print(f"and {len(rest)} more, together {_size_of(rest):.4f} N\n", highlight=False)
 
 
 def _size_of(forces: "list[ActingForce]") -> float:
@@ -166,4 +169,4 @@ def _size_of(forces: "list[ActingForce]") -> float:
 
 def _number(value: float) -> str:
     """Return a number for a table; nothing where there is none."""
-    return f"{value:.4f}" if math.isfinite(value) else ""
+    return f"{round(value, 4) + 0.0:.4f}" if math.isfinite(value) else ""  # no negative zero

@@ -93,7 +93,7 @@ def test_tables_show_the_largest_forces_of_a_kind_and_the_sum_of_the_others(fold
     assert command_line(["explain", str(folder), "--at", str(AT)]) == EXIT_OK
     out = capsys.readouterr().out
     assert f"frame {FRAME} of grid2, from {AT:g} s" in out
-    for words in ("Edge of the blade", "Faces of the blade", "Supports", "more, together"):
+    for words in ("Anchors of the edge", "Faces of the blade", "Supports", "more, together"):
         assert words in out
 
 
