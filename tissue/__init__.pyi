@@ -57,6 +57,7 @@ from .shapes.cylinder import cylinder as cylinder
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import TissueState as TissueState
+from .stepping.acting_forces import ActingForce as ActingForce
 from .tissue import Tissue as Tissue
 from .types import CUT_COLOUR as CUT_COLOUR
 from .types import SKIN_COLOUR as SKIN_COLOUR
@@ -75,6 +76,7 @@ from .types import TetrahedralMesh as TetrahedralMesh
 from .types import TissueError as TissueError
 
 __all__ = [
+    "ActingForce",
     "BladeSegment",
     "BladeShape",
     "BladeSweep",

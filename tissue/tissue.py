@@ -25,6 +25,7 @@ from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
 from tissue.solver_settings import SolverSettings
 from tissue.state.identity import Identity
 from tissue.state.tissue_state import Around, TissueState
+from tissue.stepping.acting_forces import ActingForce, acting_forces
 from tissue.stepping.assembly import assembled
 from tissue.stepping.checked_steps import CheckedSteps
 from tissue.types import (
@@ -70,9 +71,8 @@ class Tissue:
         blade: BladeShape | None = None,
         solver: SolverSettings = SolverSettings(),
     ) -> None:
-        self.material = material or Material()
-        self.blade, self.floor, self.solver = blade, floor, solver
-        settings = (self.material, blade, floor, solver)
+        settings = (material or Material(), blade, floor, solver)
+        self.material, self.blade, self.floor, self.solver = settings
         self._stages = assembled(mesh, fixed, positions, gravity, *settings)
         self._steps = CheckedSteps(self._stages)
         self._model = model = self._stages.model
@@ -88,10 +88,8 @@ class Tissue:
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Advance the body by `dt` [s] while the blade does `sweep`.
 
-        A step is accepted if all positions and velocities are finite, no node leaves the box around
-        the body faster than nodes move, and the nodes have no more energy than they were given.
-        Otherwise it is done again in shorter steps of the integrator, up to three times. If that
-        fails, the body stays as it was before, and can only be read until `load_state`.
+        A step that goes wrong (`tissue.stepping.judgement`) is done again in shorter ones, up to
+        three times. If that fails, the body stays as before, and is only read until `load_state`.
 
         Args:
             sweep: Motion of the cutting edge, or None where no blade is near.
@@ -124,7 +122,6 @@ class Tissue:
             ValueError: an array has another shape, is not finite, or an edge faces along itself.
         """
         rows, directions = checked_edges(edges, forward)
-        self._steps.begin_change()
         return self._steps.with_room(lambda: self._stages.cut_along(rows, directions))
 
     def settle(self) -> int:
@@ -137,7 +134,6 @@ class Tissue:
             TissueError: nothing holds the body, or a piece of it, against its weight and its loads,
                 its motion became unstable, or it does not come to rest. It is then where it was.
         """
-        self._steps.begin_change()
         self._steps.with_room(lambda: self._stages.take_edge(None))
         return self._stages.settle(self.floor)
 
@@ -304,6 +300,10 @@ class Tissue:
         the blade, and contacts of the body with itself and the floor.
         """
         return self._stages.handles.support_forces()
+
+    def acting_forces(self) -> list[ActingForce]:
+        """Return each force from outside on the body in the last step, those of the blade first."""
+        return acting_forces(self._stages)
 
     @property
     def n_nodes(self) -> int:

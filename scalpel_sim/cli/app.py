@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
+from scalpel_sim.cli.explain_command import explain
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
 from scalpel_sim.cli.spacemouse_command import spacemouse
@@ -121,6 +122,7 @@ def _run(
 
 
 app.command(view)
+app.command(explain)
 app.command(spacemouse)
 
 

@@ -26,7 +26,13 @@ from tissue.blade.return_mapping import relocate
 from tissue.blade.spine_contact import new_spine_contacts
 from tissue.blade.spine_search import relocate_spine
 from tissue.blade.toughness import toughness_law_of
-from tissue.blade.wrench import BladeReport, WrenchReport, blade_report, new_report
+from tissue.blade.wrench import (
+    BladeReport,
+    WrenchReport,
+    blade_report,
+    contacts_of,
+    new_report,
+)
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import SameTypes
@@ -108,6 +114,11 @@ class BladeInteraction:
     def n_samples(self) -> int:
         """Number of samples of the edge."""
         return len(self.state.anchors.state)
+
+    @property
+    def contacts(self) -> RigidContacts:
+        """Contacts of the blade at the end of the last step: views, which the next step changes."""
+        return contacts_of(self._report, self._report.n_contacts)
 
     @property
     def has_faces(self) -> bool:

@@ -64,6 +64,11 @@ class Loads:
         return bool(self._loads)
 
     @property
+    def all(self) -> tuple[Load, ...]:
+        """Those that act, in the order in which they were made."""
+        return tuple(self._loads)
+
+    @property
     def forces(self) -> tuple[FloatArray, ...]:
         """The forces of each load on its points [N], in their order."""
         return tuple(load.forces for load in self._loads)

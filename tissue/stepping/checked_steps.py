@@ -117,7 +117,8 @@ class CheckedSteps:
             )
 
     def with_room(self, change: Callable[[], Returned]) -> Returned:
-        """Do a change that may cut; where lists are full, again with more room."""
+        """Do a change that may cut (`begin_change`); where lists are full, again with more room."""
+        self.begin_change()
         while True:
             state = self._state_now()
             try:
