@@ -4,7 +4,12 @@ from .arm.grasper import add_grasper as add_grasper
 from .instruments.driven_grasper import between_pads as between_pads
 from .instruments.geom_coupling import GeomCoupling as GeomCoupling
 from .instruments.grip import Grip as Grip
+from .instruments.instrument import Instrument as Instrument
 from .preparation.prepare import prepare as prepare
+from .recording.columns import COLUMNS as COLUMNS
+from .recording.columns import ColumnGroup as ColumnGroup
+from .recording.columns import FrameData as FrameData
+from .recording.observations import OBSERVATIONS as OBSERVATIONS
 from .scene.blade import SCALPEL as SCALPEL
 from .scene.read import SCENES as SCENES
 from .scene.read import read_scene as read_scene
@@ -19,10 +24,15 @@ from .viewer.viewer import Viewer as Viewer
 
 __all__ = [
     "Blade",
+    "COLUMNS",
+    "ColumnGroup",
+    "FrameData",
     "GeomCoupling",
     "Grasper",
     "GrasperTable",
     "Grip",
+    "Instrument",
+    "OBSERVATIONS",
     "SCALPEL",
     "SCENES",
     "Scene",

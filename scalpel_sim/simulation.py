@@ -2,50 +2,40 @@
 
 import gc
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 import numpy as np
 
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
 from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
+from scalpel_sim.instruments.blade_instrument import BladeInstrument
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper
-from scalpel_sim.instruments.stroke_follower import StrokeFollower
-from scalpel_sim.recording.frame_row import FrameRows, WallTimes
-from scalpel_sim.recording.recording import Recording, columns_of_hand, held_columns
-from scalpel_sim.state import SimulationState
+from scalpel_sim.instruments.instrument import CoupledBody, Instrument
+from scalpel_sim.recording.columns import (
+    COLUMNS,
+    ColumnGroup,
+    FrameData,
+    WallTimes,
+    columns_of,
+    frame_row,
+    held_group,
+)
+from scalpel_sim.recording.observations import MaterialSamples, observed, result_at_rest
+from scalpel_sim.recording.recording import Recording
+from scalpel_sim.state import SimulationState, StartState
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import BladeSegment, FloatArray, StageTimes, StepResult, Wrench
-
-NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
+from tissue import FloatArray, StageTimes, StateError, StepResult, Wrench
 
 _NO_STEP = StageTimes(0.0, 0.0, 0.0)
-"""Times of a frame in which the tissue was not asked."""
+"""Times of a frame in which the tissue was not queried."""
 
 EveryFrame = Callable[["Simulation"], bool | None]
 """Called after each frame; a run ends early when it returns True."""
 
 DrawFrame = Callable[["Simulation"], None]
 """Called after each frame, timed as the stage RD: a replay or a live viewer draws it."""
-
-
-class CoupledBody(Protocol):
-    """A body that acts on the tissue in each frame, and is acted on by it: a grip, a contact."""
-
-    def follow(self) -> None:
-        """Be where the model is, before the tissue's step: between MuJoCo's two halves of one."""
-
-    def apply(self) -> None:
-        """Apply to the model what the tissue did in its step."""
-
-
-class Controller(Protocol):
-    """Leads the hand in each frame: a `StrokeFollower`, or a person by a `Teleoperation`."""
-
-    def lead(self, t: float) -> None:
-        """Lead the blade to its pose at time `t` [s], a step after the last one."""
 
 
 class Simulation:
@@ -78,7 +68,8 @@ class Simulation:
         self.arm = arm
         self.link = link
         self.frame = frame
-        self.stroke = stroke
+        self.blade = BladeInstrument(arm, stroke, frame)
+        """The first of the instruments."""
         self.bridge = Bridge(
             link,
             frame,
@@ -93,17 +84,24 @@ class Simulation:
             "passivity": repr(passivity),
         }
         """Settings of the coupling of arm and tissue, as text."""
-        self.wrench = NO_WRENCH
-        """Wrench on the blade in the last frame, world frame."""
         self.touching = CollisionMonitor(arm, fixtures)
         """Collisions of the arm with fixtures and with itself."""
-        self._rows = FrameRows(frame)
-        self.recording = Recording(others=held_columns(len(self.bridge.frame_loads)))
-        """Rows of the frames so far."""
-        self.graspers: list[DrivenGrasper] = []
-        """Graspers of other arms: see `add_grasper`."""
-        self.coupled_bodies: list[CoupledBody] = []
-        """Other bodies that act on the tissue, graspers among them."""
+        self.instruments: list[Instrument] = [self.blade]
+        """Instruments that are led: see `add`."""
+        self.coupled_bodies: list[CoupledBody] = [self.blade]
+        """Bodies that act on the tissue: instruments, and a `GeomCoupling` of the other bodies."""
+        self.records = True
+        """Whether each frame is recorded, set before the first one. Otherwise no row is computed,
+        `recording` stays empty, and memory does not grow."""
+        self.n_frames = 0
+        """Number of frames so far."""
+        self._shared = [*COLUMNS.values(), held_group(len(self.bridge.frame_loads))]
+        self._groups: list[ColumnGroup] = []
+        self._take_columns()
+        self.samples = MaterialSamples()
+        """Material points that were observed."""
+        self._wall_times = WallTimes()
+        self._start: StartState | None = None
         self.workspace: FloatArray | None = None
         """Where a hand may lead the middle of the edge [m], tissue frame: the lowest and the
         highest place, shape (2, 3); None: the blade follows a script."""
@@ -115,29 +113,43 @@ class Simulation:
         """Wall time of frames, pictures and recording so far."""
         self.dt: float = arm.model.opt.timestep
 
+    def _take_columns(self) -> None:
+        """Begin the recording, with the columns of all instruments."""
+        self._groups = [*self._shared, *(each.columns for each in self.instruments)]
+        self.recording = Recording(columns_of(self._groups))
+        """Rows of the frames so far."""
+
     @property
     def stroke(self) -> Stroke:
         """Path of the blade, tissue frame."""
-        return self._stroke
+        return self.blade.stroke
 
     @stroke.setter
     def stroke(self, stroke: Stroke) -> None:
-        self._stroke = stroke
-        self.controller: Controller = StrokeFollower(self.arm.hand, stroke, self.frame)
-        """Leads the blade in each frame."""
+        self.blade.stroke = stroke
 
-    def add_grasper(self, grasper: DrivenGrasper) -> None:
-        """Add a grasper of the arm's model, before the first frame."""
-        self.graspers.append(grasper)
-        self.coupled_bodies.append(grasper)
-        names = [name for each in self.graspers for name in columns_of_hand(each.name)]
-        held = held_columns(self.recording.n_held)
-        self.recording = Recording(others=[*held, *names])
+    @property
+    def wrench(self) -> Wrench:
+        """Wrench on the blade in the last frame, world frame."""
+        return self.blade.wrench
+
+    def add(self, instrument: Instrument) -> None:
+        """Add an instrument of the arm's model, before the first frame."""
+        self.instruments.append(instrument)
+        self.coupled_bodies.append(instrument)
+        self._take_columns()
+        if self._start is not None:
+            self.note_start()
+
+    @property
+    def graspers(self) -> list[DrivenGrasper]:
+        """Those of the instruments that are graspers."""
+        return [each for each in self.instruments if isinstance(each, DrivenGrasper)]
 
     @property
     def duration(self) -> float:
-        """When the blade and all graspers are at the end of their ways [s]."""
-        return max(self.stroke.duration, *(each.motion.duration for each in self.graspers), 0.0)
+        """Simulated time at which the scripts of all instruments have ended [s]."""
+        return max(each.duration for each in self.instruments)
 
     @property
     def title(self) -> str:
@@ -148,7 +160,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time of the frames so far [s]."""
-        return len(self.recording) * self.dt
+        return self.n_frames * self.dt
 
     @property
     def result(self) -> StepResult:
@@ -167,18 +179,19 @@ class Simulation:
             LinkError: the tissue is elsewhere, and did not answer.
         """
         start = time.perf_counter()
-        arm, blade, now = self.arm, self.arm.blade, self.time
-        self.controller.lead(now)
-        for grasper in self.graspers:
-            grasper.lead(now)
+        arm, blade, now = self.arm, self.blade, self.time
+        for instrument in self.instruments:
+            instrument.lead(now)
         arm.step1()
-        arm.check_if_set()  # the tissue is asked only where a blade can be
+        arm.check_if_set()  # the tissue is queried only where a blade can be
         self.touching.check()
-        segment = blade.segment()
         for body in self.coupled_bodies:
             body.follow()
-        self.wrench = self._wrench_on(segment)
-        blade.apply(self.wrench)
+        try:
+            blade.wrench = self.bridge.step(blade.segment, self.dt)
+        except Exception:
+            blade.release()
+            raise
         for body in self.coupled_bodies:
             body.apply()
         arm.step2()
@@ -187,9 +200,13 @@ class Simulation:
         for draw in self.pictures:
             draw(self)
         drawn = time.perf_counter()
-        self._record(now, segment, drawn - done, done - start)
+        self.n_frames += 1
+        if self.records:
+            stages = self.result.stage_times if self.bridge.answered else _NO_STEP
+            self._wall_times = WallTimes(*stages, drawn - done, done - start)
+            self._record(drawn)
         self.wall_seconds += time.perf_counter() - start
-        return self.wrench
+        return blade.wrench
 
     def save_state(self) -> SimulationState:
         """Return the state of arm, coupling and tissue after the last frame.
@@ -200,7 +217,7 @@ class Simulation:
         return SimulationState.of(self)
 
     def load_state(self, state: SimulationState) -> None:
-        """Put it back to a state of its own, as often as wanted; frames after that are forgotten.
+        """Return to a state of its own, as often as wanted; frames after that are forgotten.
 
         The frames that follow are those that followed then, to the bit. Wall times, pictures and
         files that were written stay.
@@ -209,54 +226,77 @@ class Simulation:
             StateError: the state is of another simulation.
         """
         state.load_into(self)
+        self.samples.relocate()
 
-    def _record(self, now: float, segment: BladeSegment, *wall_seconds: float) -> None:
-        """Add a frame to the recording, and to its row how long that took.
+    def note_start(self) -> None:
+        """Keep the present state as the one that `reset` returns to; `prepare` calls it.
+
+        Call it again after `coupled_bodies` was changed.
+
+        Raises:
+            StateError: the tissue is in another process.
+        """
+        self._start = StartState(self)
+
+    def reset(self) -> None:
+        """Return to the start: to where `note_start` was called, as often as wanted.
+
+        The frames that follow are those that followed then, to the bit; see `load_state`.
+
+        Raises:
+            StateError: no start is known, or the tissue is in another process.
+        """
+        if self._start is None:
+            raise StateError(
+                "the simulation has no start to return to. A tissue in another process keeps its "
+                "state: run without --connect. In a simulation made without prepare(), call "
+                "note_start() before the first frame"
+            )
+        self._start.load_into(self)
+        self.samples.relocate()
+
+    def observe(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return quantities of the last frame by name; before the first one, forces are zero.
 
         Args:
-            now: Simulated time at which the frame began [s].
-            segment: Where the blade is at its end.
-            wall_seconds: Wall times of its pictures, and of the frame without them [s].
+            names: Quantities of the recording, such as `tip`, `force` or `left_opening`, and names
+                of `OBSERVATIONS`, which may have an argument: `points:64`.
+
+        Returns:
+            Of each quantity its columns in SI units, shape (n_columns,), as in the recording; of
+            an observation its arrays. Copies, world frame.
+
+        Raises:
+            UsageError: no quantity is called so.
+            StateError: the tissue is in another process, and cannot be observed so.
         """
-        start = time.perf_counter()
-        bridge, result = self.bridge, self.result
-        stages = result.stage_times if bridge.answered else _NO_STEP
-        row = self._rows.row_of(
-            now,
-            segment,
-            self.wrench,
+        return observed(self, self._groups, self._frame(time.perf_counter()), names)
+
+    def _frame(self, recorded_since: float) -> FrameData:
+        """Return the last frame, which begins to be recorded at that wall clock [s]."""
+        bridge, blade = self.bridge, self.blade
+        result = bridge.result
+        return FrameData(
+            max(self.n_frames - 1, 0) * self.dt,
+            blade.segment,
+            blade.wrench,
             bridge.wrench_raw,
-            result,
-            WallTimes(*stages, *wall_seconds),
+            result_at_rest(self.link) if result is None else result,
+            self.frame,
+            bridge.frame_loads,
+            self._wall_times,
+            recorded_since,
         )
-        held = self._forces_on_attachments()
-        row.append(time.perf_counter() - start)
-        row += held
-        for grasper in self.graspers:
-            row += grasper.record()
-        self.recording.append(row)
 
-    def _forces_on_attachments(self) -> list[float]:
-        """Return the forces of the tissue on what holds it by its own scene [N], world frame."""
-        if not self.recording.n_held:
-            return []
-        loads = self.bridge.frame_loads[: self.recording.n_held]
-        forces = [self.frame.vectors_to_world(load.wrench.force) for load in loads]
-        return [number for force in forces for number in force.tolist()]
-
-    def _wrench_on(self, segment: BladeSegment) -> Wrench:
-        """Return the wrench of the tissue; where there is none, take the last one off the arm."""
-        try:
-            return self.bridge.step(segment, self.dt)
-        except Exception:
-            self.arm.blade.apply(NO_WRENCH)
-            raise
+    def _record(self, since: float) -> None:
+        """Add the last frame to the recording, which began at that wall clock [s]."""
+        self.recording.append(frame_row(self._groups, self._frame(since)))
 
     def run(self, seconds: float, every_frame: EveryFrame | None = None) -> None:
         """Do frames until `seconds` of simulated time have passed or `every_frame` returns True."""
         n_frames = round(seconds / self.dt)
         with no_garbage_collection():
-            while len(self.recording) < n_frames:
+            while self.n_frames < n_frames:
                 self.step()
                 if every_frame is not None and every_frame(self):
                     return

@@ -37,10 +37,16 @@ _RULES = StateRules(
     packages=frozenset({"bridge", "scalpel_sim"}),
     kept=frozenset({"Recording", "Stroke", "GraspMotion", "Fixtures", "ArmGeom"}),
     derived={"Grip._views": _none},
-    own=frozenset({"Simulation.recording", "Simulation.pictures", "Simulation.wall_seconds"}),
+    own=frozenset(
+        f"Simulation.{name}"
+        for name in (
+            *("recording", "records", "n_frames", "pictures", "wall_seconds"),
+            *("_shared", "_groups", "samples", "_wall_times", "_start"),
+        )
+    ),
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the
     # stroke that was recorded.
-    unwritten=frozenset({"Simulation.controller", "DrivenGrasper.controller"}),
+    unwritten=frozenset({"BladeInstrument.controller", "DrivenGrasper.controller"}),
     made={kind.__name__: kind for kind in (Grip, DrivenFrame, Proxy)},
 )
 """Rules of the state of arm and bridge; the tissue has its own."""
@@ -55,14 +61,19 @@ class SavedSimulation(Protocol):
     arm: DrivenArm
     link: TissueLink
     frame: TissueFrame
-    graspers: list[DrivenGrasper]
     recording: Recording
+    records: bool
+    n_frames: int
     coupled: dict[str, str]
     wall_seconds: float
 
     @property
     def stroke(self) -> Stroke:
         """Path of the blade."""
+
+    @property
+    def graspers(self) -> list[DrivenGrasper]:
+        """Graspers of other arms."""
 
 
 class _Elsewhere(NamedTuple):
@@ -110,7 +121,7 @@ class SimulationState:
         mujoco.mj_getState(model, data, arm, _SPEC)
         tissue, memento = link.tissue.save_state(), Memento(simulation, _RULES)
         places = np.concatenate([getattr(data, name).ravel() for name in _PLACES])
-        return cls(memento, arm, places, tissue, len(simulation.recording))
+        return cls(memento, arm, places, tissue, simulation.n_frames)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
@@ -159,7 +170,7 @@ class SimulationState:
                 "the state is of another simulation: load it into the one that saved it, or turn "
                 "it into bytes first"
             )
-        if len(simulation.recording) < self.n_frames:
+        if simulation.records and len(simulation.recording) < self.n_frames:
             raise StateError(
                 f"the state is of frame {self.n_frames}, and the recording has "
                 f"{len(simulation.recording)} frames: put back the recording of then first"
@@ -183,7 +194,43 @@ class SimulationState:
         mujoco.mj_forward(model, data)  # for whoever looks at the arm before the next frame
         mujoco.mj_setState(model, data, self._arm, _SPEC)  # it has moved its solver on
         _put_at(data, self._places)
-        simulation.recording.cut_back(self.n_frames)
+        simulation.n_frames = self.n_frames
+        if simulation.records:
+            simulation.recording.cut_back(self.n_frames)
+
+
+class StartState:
+    """The state at the start of a simulation, which owns it without a cycle of references.
+
+    Without that a simulation that is dropped would keep its memory until cycles are collected.
+
+    Raises:
+        StateError: its tissue is in another process.
+    """
+
+    def __init__(self, simulation: SavedSimulation) -> None:
+        self._state = SimulationState.of(simulation)
+        self._detach()
+
+    def load_into(self, simulation: SavedSimulation) -> None:
+        """Put the simulation of which it is the start to this state."""
+        source = self._memento
+        source.root = simulation
+        source.objects.insert(0, (simulation, self._attributes))
+        try:
+            self._state.load_into(simulation)
+        finally:
+            self._detach()
+
+    @property
+    def _memento(self) -> Memento:
+        assert isinstance(self._state._source, Memento)
+        return self._state._source
+
+    def _detach(self) -> None:
+        """Keep the attributes of the simulation, which is the first of all objects, without it."""
+        self._attributes: dict[str, Any] = self._memento.objects.pop(0)[1]
+        self._memento.root = None
 
 
 def _mujoco_of(simulation: SavedSimulation) -> tuple[Any, Any]:

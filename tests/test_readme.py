@@ -4,11 +4,13 @@ import re
 import shlex
 import tomllib
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from cyclopts import App
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
+from scalpel_sim import COLUMNS, OBSERVATIONS
 from scalpel_sim.cli.app import app, command_line
 from scalpel_sim.runs.file_names import RUN_FILES
 
@@ -60,8 +62,11 @@ def page_of(case: tuple[str, object]) -> str:
 
 @pytest.fixture
 def in_folder(tmp_path, monkeypatch):
+    """Run in a folder of its own; what is added to registries is taken out again."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of processes that the code starts
+    with patch.dict(COLUMNS), patch.dict(OBSERVATIONS):
+        yield
 
 
 @pytest.mark.parametrize("case", blocks("python"), ids=page_of)

@@ -50,12 +50,11 @@ class DeviceHand(Teleoperation):
         self._simulation, self._factor, self._listen = simulation, factor, listen
         self._watchdog, self._ends_with_client = watchdog, ends_with_client
         self._stylus: CartesianPose | None = None
-        self._is_to_end = False
 
     @property
     def has_begun(self) -> bool:
         """Whether a device has taken hold of the blade, or has ended the stroke before."""
-        return self.is_engaged or self._is_to_end
+        return self.is_engaged or self.is_to_end
 
     def servo_cp(self, pose: CartesianPose, *, holds: bool) -> None:
         """Move and turn the wanted pose as the stylus has moved since the last call.
@@ -96,11 +95,7 @@ class DeviceHand(Teleoperation):
         """Release the blade, as the device has gone."""
         has_led = self._heard_at > -math.inf
         self.release()
-        self._is_to_end |= self._ends_with_client and has_led
-
-    def end(self) -> None:
-        """End the stroke before the next frame."""
-        self._is_to_end = True
+        self.is_to_end |= self._ends_with_client and has_led
 
     def state(self) -> DeviceState:
         """Return how the blade is after the last frame."""
@@ -120,12 +115,12 @@ class DeviceHand(Teleoperation):
     def _obey(self) -> bool:
         """Release the blade after a long silence; return whether the run is to end."""
         self._listen()
-        self._is_to_end |= any(isinstance(command, End) for command in self.commands)
+        self.is_to_end |= any(isinstance(command, End) for command in self.commands)
         self.commands.clear()  # a page may end the stroke, and leads nothing
         if self.is_engaged and self._clock() - self._heard_at > self._watchdog:
             self.release()
-            self._is_to_end |= self._ends_with_client
-        return self._is_to_end
+            self.is_to_end |= self._ends_with_client
+        return self.is_to_end
 
     def _want(self, move: FloatArray, turn: FloatArray) -> None:
         """Move the tip, and turn the blade about it.

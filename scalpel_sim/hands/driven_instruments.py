@@ -9,21 +9,19 @@ from bridge import TissueFrame
 from scalpel_sim.arm.grasper import HALF_PAD, GuidedGrasper
 from scalpel_sim.arm.hand import Hand
 from scalpel_sim.hands.limited_pose import LimitedPose
+from scalpel_sim.instruments.blade_instrument import BLADE
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.scene.values import WIDEST_OPENING
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint, edge_of_grasper
 from scalpel_sim.strokes.stroke import Stroke, poses_of_edges
 from tissue import BladeSegment, FloatArray
 
-BLADE = "scalpel"
-"""What the page calls the instrument of the first arm."""
-
 JAW_SPEED = 0.03
 """Speed at which the pads come together, and apart [m/s]: the scripts of the scenes close them by
 9 mm in 0.3 s."""
 
 
-class Instrument(Protocol):
+class LiveInstrument(Protocol):
     """An instrument that a person leads when they have chosen it, and which rests else."""
 
     name: str
@@ -63,7 +61,7 @@ class Instrument(Protocol):
 
 
 class LiveBlade:
-    """See `Instrument`. Its rows are those of `LED_COLUMNS`.
+    """See `LiveInstrument`. Its rows are those of `LED_COLUMNS`.
 
     Args:
         hand: Holds the blade already, at the start.
@@ -102,7 +100,7 @@ class LiveBlade:
         """It has none."""
 
     def advance(self, t: float, *, is_engaged: bool, moves: bool) -> None:
-        """See `Instrument.advance`."""
+        """See `LiveInstrument.advance`."""
         # The record begins at the start.
         if moves and self._record.has_begun and self.pose.step():
             self._take_pose()
@@ -113,11 +111,11 @@ class LiveBlade:
         self._path.lead(t)
 
     def finish(self, t: float) -> None:
-        """See `Instrument.finish`."""
+        """See `LiveInstrument.finish`."""
         self._record.finish(t)
 
     def take_rows(self) -> list[list[float]]:
-        """See `Instrument.take_rows`."""
+        """See `LiveInstrument.take_rows`."""
         return self._record.take_rows()
 
     def _take_pose(self) -> None:
@@ -132,7 +130,7 @@ class LiveBlade:
 
 
 class LiveGrasper:
-    """See `Instrument`. Its rows are those of `GRASP_COLUMNS`.
+    """See `LiveInstrument`. Its rows are those of `GRASP_COLUMNS`.
 
     Its jaws close and open as far as they do in a motion. Where they only rest there, they close
     and open as far as they can.
@@ -184,7 +182,7 @@ class LiveGrasper:
         self._wanted_opening = self._closed if closed else self._open
 
     def advance(self, t: float, *, is_engaged: bool, moves: bool) -> None:
-        """See `Instrument.advance`."""
+        """See `LiveInstrument.advance`."""
         if moves and self._record.has_begun:
             if self.pose.step():
                 self._take_pose()
@@ -197,11 +195,11 @@ class LiveGrasper:
         self._grasper.open_to(self._at.opening)
 
     def finish(self, t: float) -> None:
-        """See `Instrument.finish`."""
+        """See `LiveInstrument.finish`."""
         self._record.finish(t)
 
     def take_rows(self) -> list[list[float]]:
-        """See `Instrument.take_rows`."""
+        """See `LiveInstrument.take_rows`."""
         return self._record.take_rows()
 
     def _edge(self, at: Waypoint) -> BladeSegment:

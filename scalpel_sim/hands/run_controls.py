@@ -13,12 +13,17 @@ from scalpel_sim.hands.commands import (
     End,
     Engage,
     Jaws,
+    Lead,
     LeadingCommand,
+    Move,
     Pause,
+    Release,
     Reset,
     Resume,
     SlowMotion,
     Step,
+    StillThere,
+    Turn,
     Undo,
 )
 from scalpel_sim.hands.teleoperation import Teleoperation
@@ -211,7 +216,8 @@ class RunControls:
     def obey(self) -> bool:
         """Obey the page; return whether the run is to wait, and then to obey again."""
         while self.commands:
-            self._do(self.commands.popleft())
+            command = self.commands.popleft()
+            RUN_COMMANDS[type(command)](self, command)
         if not self.is_paused:
             return False
         if self._frames_left:
@@ -226,36 +232,44 @@ class RunControls:
         self.pace.go_on()
         return True
 
-    def _do(self, command: Command) -> None:
-        if isinstance(command, LeadingCommand):
-            if isinstance(command, Engage | Jaws):
-                self._begin_stroke()
-            self._pass_on(command)
-        elif isinstance(command, Pause | Resume):
-            self._release()
-            self.is_paused, self._frames_left = isinstance(command, Pause), 0
-            self.on_change()
-        elif isinstance(command, Step):
-            self._frames_left = FRAMES_PER_STEP
-        elif isinstance(command, SlowMotion):
-            self.pace.rate = command.rate
-            self.on_change()
-        elif isinstance(command, Undo | Reset):
-            self._go_back(isinstance(command, Reset))
-        elif isinstance(command, Begin):
-            self.next = command
-            self._pass_on(End())
+    def stop_time(self, *, stops: bool) -> None:
+        """Release the instrument, and stop the time or continue it."""
+        self._release()
+        self.is_paused, self._frames_left = stops, 0
+        self.on_change()
 
-    def _pass_on(self, command: LeadingCommand) -> None:
-        """Pass a command on to the hand."""
-        if isinstance(command, End):
-            self.is_paused, self.has_ended = False, True
-        if self.hand is None:
-            return
-        if isinstance(command, Choose) and self.is_paused:  # no frame would show it
+    def step(self) -> None:
+        """Continue the time for `FRAMES_PER_STEP` frames."""
+        self._frames_left = FRAMES_PER_STEP
+
+    def slow_down(self, rate: float) -> None:
+        """Change the rate at which time passes."""
+        self.pace.rate = rate
+        self.on_change()
+
+    def end(self, following: Begin | None = None) -> None:
+        """End the run; `following` is the one after it."""
+        if following is not None:
+            self.next = following
+        self.is_paused, self.has_ended = False, True
+        self.pass_on(End())
+
+    def choose(self, command: Choose) -> None:
+        """Lead another instrument, at once where no frame would show it."""
+        if self.hand is not None and self.is_paused:
             self.hand.choose(command.instrument)
             self.on_change()
         else:
+            self.pass_on(command)
+
+    def begin_stroke(self, command: Engage | Jaws) -> None:
+        """Keep the present for an undo, and pass the command on."""
+        self._begin_stroke()
+        self.pass_on(command)
+
+    def pass_on(self, command: LeadingCommand) -> None:
+        """Pass a command on to the hand."""
+        if self.hand is not None:
             self.hand.commands.append(command)
 
     def _begin_stroke(self) -> None:
@@ -267,7 +281,8 @@ class RunControls:
         self._numbers_before_stroke = self.hand.numbers
         self.history.add()
 
-    def _go_back(self, to_start: bool) -> None:
+    def go_back(self, *, to_start: bool) -> None:
+        """Return to before the last stroke, or to the start."""
         if self.hand is not None:
             self.hand.commands.clear()
             if self.hand.numbers == self._numbers_before_stroke and not to_start:
@@ -283,3 +298,24 @@ class RunControls:
         if self.hand is not None:
             self.hand.commands.clear()
             self.hand.release()
+
+
+RUN_COMMANDS: dict[type[Command], Callable[[RunControls, Any], None]] = {
+    Pause: lambda run, _: run.stop_time(stops=True),
+    Resume: lambda run, _: run.stop_time(stops=False),
+    Step: lambda run, _: run.step(),
+    SlowMotion: lambda run, command: run.slow_down(command.rate),
+    Undo: lambda run, _: run.go_back(to_start=False),
+    Reset: lambda run, _: run.go_back(to_start=True),
+    Begin: lambda run, command: run.end(command),
+    End: lambda run, _: run.end(),
+    Choose: RunControls.choose,
+    Engage: RunControls.begin_stroke,
+    Jaws: RunControls.begin_stroke,
+    Release: RunControls.pass_on,
+    Move: RunControls.pass_on,
+    Turn: RunControls.pass_on,
+    StillThere: RunControls.pass_on,
+    Lead: lambda run, _: None,
+}
+"""Handler of each message between two frames. Those that the hand obeys are in `HAND_COMMANDS`."""

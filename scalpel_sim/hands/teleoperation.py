@@ -5,6 +5,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +18,10 @@ from scalpel_sim.hands.commands import (
     LeadingCommand,
     Move,
     Release,
+    StillThere,
     Turn,
 )
-from scalpel_sim.hands.driven_instruments import Instrument, LiveBlade, LiveGrasper
+from scalpel_sim.hands.driven_instruments import LiveBlade, LiveGrasper, LiveInstrument
 from scalpel_sim.simulation import Simulation
 from tissue import FloatArray
 
@@ -52,6 +54,8 @@ class Teleoperation(abc.ABC):
         """Stamp of the newest command that it has obeyed; None: there was none yet."""
         self.is_engaged = False
         """Whether it leads the chosen instrument."""
+        self.is_to_end = False
+        """Whether it ends before the next frame."""
         self.ended_at: float | None = None
         """Simulated time at which it has ended [s]; from then on all rest."""
         self.n_limited = 0
@@ -61,10 +65,14 @@ class Teleoperation(abc.ABC):
         self._heard_at = -math.inf
         self.blade = _live_blade(simulation)
         self.graspers = _live_graspers(simulation)
-        self.instruments: tuple[Instrument, ...] = (self.blade, *self.graspers)
+        self.instruments: tuple[LiveInstrument, ...] = (self.blade, *self.graspers)
         """Instruments that it may choose."""
         self.chosen = 0
         """Which of them it leads."""
+
+    def end(self) -> None:
+        """End before the next frame."""
+        self.is_to_end = True
 
     @abc.abstractmethod
     def _obey(self) -> bool:
@@ -72,7 +80,7 @@ class Teleoperation(abc.ABC):
 
     def take_over(self, simulation: Simulation) -> None:
         """Lead the instruments of the simulation that it was made for, from its next frame on."""
-        simulation.controller = self
+        simulation.blade.controller = self
         for grasper, live in zip(simulation.graspers, self.graspers, strict=True):
             grasper.controller = live
 
@@ -143,28 +151,39 @@ class LiveHand(Teleoperation):
 
     def _obey(self) -> bool:
         """Obey the commands; return whether one of them ends the run."""
-        has_ended = False
         while self.commands:
             command = self.commands.popleft()
             self._heard_at = self._clock()
-            chosen = self.instruments[self.chosen]
-            if isinstance(command, Move | Turn):
-                self.stamp = command.stamp
-                by = self._frame.vectors_to_tissue(np.array(command.by))
-                if self.is_engaged and isinstance(command, Move):
-                    chosen.pose.move(by)
-                elif self.is_engaged:
-                    chosen.pose.turn(by)
-            elif isinstance(command, Engage):
-                self.is_engaged = True
-            elif isinstance(command, Release):
-                self.release()
-            elif isinstance(command, Choose):
-                self.choose(command.instrument)
-            elif isinstance(command, Jaws):
-                chosen.close_jaws(command.closed)
-            elif isinstance(command, End):
-                has_ended = True
+            HAND_COMMANDS[type(command)](self, command)
         if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
             self.release()
-        return has_ended
+        return self.is_to_end
+
+    def engage(self) -> None:
+        """Lead the chosen instrument from now on."""
+        self.is_engaged = True
+
+    def move(self, command: Move | Turn) -> None:
+        """Move or turn the chosen instrument, if it is engaged."""
+        self.stamp = command.stamp
+        by = self._frame.vectors_to_tissue(np.array(command.by))
+        pose = self.instruments[self.chosen].pose
+        if self.is_engaged:
+            (pose.move if isinstance(command, Move) else pose.turn)(by)
+
+    def close_jaws(self, closed: bool) -> None:
+        """Close or open the jaws of the chosen instrument."""
+        self.instruments[self.chosen].close_jaws(closed)
+
+
+HAND_COMMANDS: dict[type[LeadingCommand], Callable[[LiveHand, Any], None]] = {
+    Engage: lambda hand, _: hand.engage(),
+    Release: lambda hand, _: hand.release(),
+    Move: LiveHand.move,
+    Turn: LiveHand.move,
+    Choose: lambda hand, command: hand.choose(command.instrument),
+    Jaws: lambda hand, command: hand.close_jaws(command.closed),
+    End: lambda hand, _: hand.end(),
+    StillThere: lambda hand, _: None,
+}
+"""Handler of each message that the hand obeys in its next frame."""

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from bridge import Bridge, TissueFrame
 from scalpel_sim.arm.grasper import HALF_PAD, GuidedGrasper, Pads
 from scalpel_sim.instruments.grip import Grip, frame_of
+from scalpel_sim.instruments.instrument import Controller
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
+from scalpel_sim.recording.columns import ColumnGroup, FrameData, grasper_quantities
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from tissue import FloatArray, Tissue, Wrench
 
@@ -45,13 +47,6 @@ class GripSettings(NamedTuple):
     """Distance between the pads below which they hold what is between them [m]."""
 
 
-class GrasperController(Protocol):
-    """Leads a grasper in each frame: a `MotionFollower`, or a person by a `LiveGrasper`."""
-
-    def lead(self, t: float) -> None:
-        """Lead it to its pose and opening at time `t` [s], a step after the last one."""
-
-
 class MotionFollower:
     """Leads a grasper along a motion.
 
@@ -72,9 +67,7 @@ class MotionFollower:
 
 
 class DrivenGrasper:
-    """A grasper that is led along a motion, and the tissue that it holds.
-
-    A frame is `lead`, MuJoCo's `mj_step1`, `follow`, the tissue's step, `apply`, and `mj_step2`.
+    """A grasper that is led along a motion, and the tissue that it holds. See `Instrument`.
 
     Args:
         grasper: The grasper.
@@ -105,10 +98,10 @@ class DrivenGrasper:
         self._frame = frame = frame_of(tissue, frame)
         self._was_closed = False
         self._had_met = False
-        self._settingss_some = False
+        self._has_held = False
         self.workspace = workspace
         """Where a person may lead the middle of the pads [m], shape (2, 3); None: nowhere."""
-        self.controller: GrasperController = MotionFollower(grasper, motion, frame)
+        self.controller: Controller = MotionFollower(grasper, motion, frame)
         """Leads the grasper in each frame."""
 
     @property
@@ -121,11 +114,21 @@ class DrivenGrasper:
         """Wrench of the tissue on it in the last frame: see `Grasper.wrench`."""
         return self.grasper.wrench
 
-    def record(self) -> list[float]:
-        """Return force [N] and torque [N m] of the tissue on it, its opening [m], and `n_points`.
+    @property
+    def duration(self) -> float:
+        """Simulated time at which the motion ends [s]."""
+        return self.motion.duration
+
+    @property
+    def columns(self) -> ColumnGroup:
+        """Force [N] and torque [N m] of the tissue on it, its opening [m], and `n_points`.
 
         World frame, about the middle between the pads.
         """
+        return ColumnGroup(grasper_quantities(self.name), self._numbers)
+
+    def _numbers(self, _: FrameData) -> list[float]:
+        """Return the numbers of its columns."""
         return [*self.wrench.numbers[:6], self.grasper.opening, float(self.n_points)]
 
     def lead(self, t: float) -> None:
@@ -155,14 +158,14 @@ class DrivenGrasper:
             self._was_closed = is_closed
         if self.grip is not None:
             self.grip.follow()
-            if self._settingss_some and not self.n_points:
+            if self._has_held and not self.n_points:
                 _log.warning(
                     "at %.3f s the tissue slipped out of the grasper '%s': it pulled with more "
                     "than its breaks_at",
                     self._data.time,
                     self.name,
                 )
-        self._settingss_some = self.n_points > 0
+        self._has_held = self.n_points > 0
 
     def apply(self) -> None:
         """Apply to it what the tissue did in the last step.

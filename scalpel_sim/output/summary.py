@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.recording.recording import ACCOUNT, Recording
+from scalpel_sim.recording.columns import ACCOUNT
+from scalpel_sim.recording.recording import Recording
 from scalpel_sim.version import version
 from tissue import CutReport, Piece
 

@@ -42,6 +42,7 @@ def prepare(
     fixtures: Iterable[Fixture] = (),
     *,
     is_led: bool = False,
+    records: bool = True,
 ) -> Simulation:
     """Return the simulation of a scene, at its start.
 
@@ -55,6 +56,7 @@ def prepare(
             chosen here, so that the arm reaches.
         is_led: Whether a hand will lead the blade and the graspers: then they rest where their
             scripts start, and the arms stand where they reach around the body, as far as they do.
+        records: Whether frames are recorded: see `Simulation.records`.
 
     Raises:
         ValueError: parts of the scene do not fit together; the message says which.
@@ -98,10 +100,13 @@ def prepare(
         coupling=scene.virtual_coupling(),
         passivity=scene.arm.passivity,
     )
+    simulation.records = records
     simulation.workspace = stands.room
     simulation.expected_force = needed.force
     if scene.graspers:
         _add_graspers(simulation, scene.graspers, motions)
+    if isinstance(link, InProcessLink):
+        simulation.note_start()
     return simulation
 
 
@@ -124,7 +129,7 @@ def _add_graspers(
     ]  # the tissue has them already
     simulation.coupled_bodies.append(GeomCoupling(arm.data, bridge, without=known))
     for grasper in driven_graspers(graspers, motions, arm, bridge):
-        simulation.add_grasper(grasper)
+        simulation.add(grasper)
 
 
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:

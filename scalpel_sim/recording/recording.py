@@ -10,50 +10,16 @@ from typing import BinaryIO, NamedTuple
 import msgspec
 import numpy as np
 
-from scalpel_sim.recording.row_store import RowStore
-from tissue import Energies, FloatArray
-
-ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
-"""Columns of the energy account since the start: the terms of `tissue.Energies`, and the residual.
-NaN without an audit."""
-
-N_OF_ACCOUNT = len(ACCOUNT)
-
-
-def _vector(name: str, unit: str) -> tuple[str, ...]:
-    return tuple(f"{name}_{axis}_{unit}" for axis in "xyz")
-
-
-WALL_TIMES = ("cd_s", "gc_s", "rx_s", "rd_s", "frame_s", "recording_s")
-"""Columns that differ from run to run: what frames took."""
-
-COLUMNS = (
-    "time_s",
-    *_vector("tip", "m"),
-    *_vector("force", "n"),
-    *_vector("torque", "nm"),
-    *_vector("tissue_force", "n"),
-    *_vector("tissue_torque", "nm"),
-    *_vector("edge_force", "n"),
-    *_vector("pressing_force", "n"),
-    *_vector("friction_force", "n"),
-    *(f"stiffness_{axes}_n_m" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
-    "cut_area_m2",
-    "finished_area_m2",
-    "tetrahedra",
-    "anchored_length_m",
-    "work_of_blade_j",
-    *ACCOUNT,
-    *WALL_TIMES,
+from scalpel_sim.errors import unknown
+from scalpel_sim.recording.columns import (
+    COLUMNS,
+    columns_in,
+    grasper_quantities,
+    shared_columns,
+    vector_columns,
 )
-"""Names and units. Vectors are in the world frame. `force` and `torque` are what the arm feels,
-averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` are what the
-tissue exerts, before the limits of the device. `edge_force`, `pressing_force` and `friction_force`
-are what the tissue does to the blade's edge, to its faces, and along them, at the end of the frame;
-`stiffness` is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall
-times of the stages that the paper's Table 1 names: collision detection, geometric changes,
-relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering (`rd_s`)
-and without the recording of its row (`recording_s`)."""
+from scalpel_sim.recording.row_store import RowStore
+from tissue import FloatArray
 
 
 class Term(NamedTuple):
@@ -81,44 +47,21 @@ TERMS = (
 """The terms in the order of the table: first what is dissipated, then what is stored."""
 
 
-def held_columns(n: int) -> tuple[str, ...]:
-    """Return the columns of a run with `n` attachments: the force of the tissue on each, world.
-
-    They come after `COLUMNS`, averaged over the frame.
-    """
-    return tuple(name for i in range(n) for name in _vector(f"held_{i}", "n"))
-
-
-def columns_of_hand(name: str) -> tuple[str, ...]:
-    """Return the columns of a grasper, which follow after all others.
-
-    Force and torque of the tissue on it in the frame, about the middle between the pads, world
-    frame; the distance between the pads; and how many points of the tissue are tied to it.
-    """
-    vectors = (*_vector(f"{name}_force", "n"), *_vector(f"{name}_torque", "nm"))
-    return (*vectors, f"{name}_opening_m", f"{name}_points")
-
-
-def _n_held(columns: Sequence[str]) -> int:
-    """Return the number of attachments that have columns."""
-    return sum(re.fullmatch(r"held_\d+_x_n", name) is not None for name in columns)
-
-
 _LINES_PER_READ = 1024
 """Lines of `forces.csv` that are read together: some megabytes of text."""
 
 
 class Recording:
-    """Rows of `COLUMNS`, one per frame. Some seconds are in memory; see `RowStore`.
+    """Rows of numbers, one per frame. Some seconds are in memory; see `RowStore`.
 
     Args:
-        others: Further columns: see `held_columns` and `columns_of_hand`, in this order.
+        columns: Names of the columns; None: those of `COLUMNS`.
     """
 
-    def __init__(self, others: Sequence[str] = ()) -> None:
-        self.columns = (*COLUMNS, *others)
+    def __init__(self, columns: Sequence[str] | None = None) -> None:
+        self.columns = shared_columns() if columns is None else tuple(columns)
         """Names and units of all columns."""
-        self.n_held = _n_held(self.columns)
+        self.n_held = sum(_is_held(name) for name in self.columns)
         """Number of attachments."""
         self._store = RowStore(len(self.columns))
         self.append = self._store.append
@@ -150,8 +93,13 @@ class Recording:
             yield from part
 
     def column(self, name: str) -> FloatArray:
-        """Return one column, shape (n_frames,). A view where memory holds all frames."""
-        return self._columns(slice(self.columns.index(name), self.columns.index(name) + 1))[:, 0]
+        """Return one column, shape (n_frames,). A view where memory holds all frames.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        at = self._place_of_column(name)
+        return self._columns(slice(at, at + 1))[:, 0]
 
     def vector(self, name: str) -> FloatArray:
         """Return the three columns of a vector such as `tip`, shape (n_frames, 3), alike."""
@@ -166,11 +114,17 @@ class Recording:
     def at_end(self, name: str) -> float:
         """Return a number of the last frame; 0 where there is none."""
         last = self.since(max(0, len(self) - 1))
-        return float(last[-1, self.columns.index(name)]) if len(last) else 0.0
+        return float(last[-1, self._place_of_column(name)]) if len(last) else 0.0
+
+    def _place_of_column(self, name: str) -> int:
+        if name not in self.columns:
+            raise unknown("column", name, self.columns)
+        return self.columns.index(name)
 
     def _place_of(self, name: str) -> slice:
         """Return which columns a vector has."""
-        first = next(i for i, each in enumerate(self.columns) if each.startswith(f"{name}_x_"))
+        names = (each for each in self.columns if each.startswith(f"{name}_x_"))
+        first = self._place_of_column(next(names, f"{name}_x"))
         return slice(first, first + 3)
 
     def _columns(self, place: slice) -> FloatArray:
@@ -187,10 +141,11 @@ class Recording:
     @property
     def hands(self) -> tuple[str, ...]:
         """Names of the graspers."""
+        there = set(self.columns)
         return tuple(
-            each.removesuffix("_opening_m")
-            for each in self.columns[len(COLUMNS) :]
-            if each.endswith("_opening_m")
+            name
+            for name in (each.removesuffix("_opening_m") for each in self.columns)
+            if there.issuperset(columns_in(grasper_quantities(name)))
         )
 
     @property
@@ -216,19 +171,37 @@ def read_forces(path: Path, n_bytes: int | None = None) -> Recording:
         text = _text_lines(file, n_bytes)
         header = next(text, "").strip()
         columns = header.split(",")
-        others = columns[len(COLUMNS) :]
-        hands = [each.removesuffix("_opening_m") for each in others if each.endswith("_opening_m")]
-        of_hands = [name for hand in hands for name in columns_of_hand(hand)]
-        if columns != [*COLUMNS, *held_columns(_n_held(columns)), *of_hands]:
+        if not _are_of_a_run(columns):
             raise ValueError(
                 f"{path}: the first line is '{header[:200]}'; it must be the columns of a run"
             )
-        recording = Recording(others)
+        recording = Recording(columns)
         while lines := list(islice(text, _LINES_PER_READ)):
             if whole := [line for line in lines if line.endswith("\n")]:
-                for row in np.loadtxt(whole, delimiter=",", ndmin=2):
+                rows = np.loadtxt(whole, delimiter=",", ndmin=2)
+                if rows.shape[1] != len(columns):
+                    raise ValueError(f"{path}: the rows have not as many numbers as columns")
+                for row in rows:
                     recording.append(row)
     return recording
+
+
+def _are_of_a_run(columns: Sequence[str]) -> bool:
+    """Return whether these are names of columns, from the time on, with whole vectors.
+
+    Some may be missing, since the file is older than they are, and others may be unknown here.
+    """
+    there = set(columns)
+    quantities = (names for group in COLUMNS.values() for names in group.quantities.values())
+    vectors = (name.split("_x_") for name in columns if "_x_" in name)
+    wholes = [*quantities, *(vector_columns(*parts) for parts in vectors)]
+    is_whole = all(there.issuperset(names) or there.isdisjoint(names) for names in wholes)
+    return columns[0] == "time_s" and len(there) == len(columns) and is_whole
+
+
+def _is_held(column: str) -> bool:
+    """Return whether a column is the first one of an attachment."""
+    return re.fullmatch(r"held_\d+_x_n", column) is not None
 
 
 def _text_lines(file: BinaryIO, n_bytes: int | None) -> Iterator[str]:

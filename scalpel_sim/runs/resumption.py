@@ -10,8 +10,9 @@ import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import COMPLETE
+from scalpel_sim.recording.columns import WALL_TIMES
 from scalpel_sim.recording.growing_file import FileSum, sum_of, sums_that_hold
-from scalpel_sim.recording.recording import WALL_TIMES, Recording, read_forces
+from scalpel_sim.recording.recording import Recording, read_forces
 from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints
 from scalpel_sim.runs.file_names import (
     FORCES,
@@ -25,7 +26,7 @@ from scalpel_sim.runs.file_names import (
 from scalpel_sim.runs.journal import RunMark, RunPlan, read_journal
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state import SimulationState
-from tissue import FloatArray
+from tissue import FloatArray, StateError
 from tissue.support import whole_file
 
 CHANGED_SCENE = "scene.changed.toml"
@@ -90,6 +91,10 @@ class Resumption(NamedTuple):
         Raises:
             StateError: it was made otherwise than the one that was interrupted.
         """
+        if len(self.recorded) and self.recorded.columns != simulation.recording.columns:
+            raise StateError(
+                f"{FORCES} has other columns than this program records: do the run again"
+            )
         if self.checkpoint is None:
             return
         for row, _ in zip(self.recorded.rows_from(0), range(self.n_frames), strict=False):

@@ -13,8 +13,9 @@ import numpy as np
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary, summary_json
+from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.growing_file import FileSum, GrowingFile
-from scalpel_sim.recording.recording import COLUMNS, Recording, lines_of_rows
+from scalpel_sim.recording.recording import Recording, lines_of_rows
 from scalpel_sim.runs.file_names import (
     ENERGY_PLOT,
     FORCES,
@@ -74,7 +75,7 @@ class Outputs:
     Args:
         folder: The folder; it is made if there is none.
         plotter: Draws the plots. The caller closes it.
-        columns: Columns of `forces.csv`.
+        columns: Columns of `forces.csv`; None: those that each run has.
         exports: Files beside the folder for the body's surface after the run; see `export`.
         checkpoint_seconds: Simulated time between two checkpoints [s]; 0: there are none.
         resumption: What is there of the run, if it goes on from there: then those files stay.
@@ -88,7 +89,7 @@ class Outputs:
         self,
         folder: Path,
         plotter: Plotter,
-        columns: Sequence[str] = COLUMNS,
+        columns: Sequence[str] | None = None,
         exports: Sequence[Path] = (),
         checkpoint_seconds: float = 0.0,
         resumption: Resumption | None = None,
@@ -103,7 +104,7 @@ class Outputs:
             if resumption is None:
                 self.remove_earlier_files()
             kept = FileSum() if resumption is None else resumption.forces
-            self._forces = self._growing(FORCES, columns, kept)
+            self._forces = self._growing(FORCES, columns or shared_columns(), kept)
         except BaseException:
             self._lock.release()
             raise

@@ -23,8 +23,8 @@ from bridge import TissueFrame, compiled_arithmetic
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
+from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, frame_row
 from scalpel_sim.recording.force_parts import force_parts
-from scalpel_sim.recording.frame_row import FrameRows, WallTimes
 from scalpel_sim.runs.stop_signals import SignalInterrupt, StopSignals
 from scalpel_sim.scene.read import PARENCHYMA, PHANTOM
 from scalpel_sim.scene.scene import Scene
@@ -208,9 +208,9 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
         after = _edge(fraction)
         result = tissue.step(BladeSweep(before, after), dt)
         before = after
-    wall_times = WallTimes(*result.stage_times, 0.0, 0.0)
     wrenches = (result.wrench, result.wrench)
-    FrameRows(TissueFrame()).row_of(0.0, before, *wrenches, result, wall_times)
+    frame = FrameData(0.0, before, *wrenches, result, TissueFrame(), (), WallTimes(), 0.0)
+    frame_row(COLUMNS.values(), frame)
     force_parts(result.contacts, before.forward)
     tissue.step(None, dt)
     tissue.chunks()

@@ -9,7 +9,8 @@ from scalpel_sim import prepare, read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation.tissue import make_tissue, times_of
-from scalpel_sim.recording.recording import COLUMNS, held_columns, read_forces
+from scalpel_sim.recording.columns import held_group, shared_columns
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.scene.checks import check_attachment
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import AttachmentTable
@@ -67,7 +68,7 @@ def first(tmp_path_factory):
 
 def test_the_forces_on_attachments_have_columns_of_their_own_at_the_end(first):
     recording = read_forces(first / "forces.csv")
-    assert recording.columns == COLUMNS + held_columns(2)
+    assert recording.columns == shared_columns() + held_group(2).columns
     right, tie = recording.vector("held_0"), recording.vector("held_1")
     time = recording.column("time_s")
     assert right[abs(time - 0.1).argmin(), 0] < -0.2  # pulled back while it is led away

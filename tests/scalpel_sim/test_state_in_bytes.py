@@ -76,7 +76,7 @@ def test_loading_bytes_changes_no_constant():
     simulation.run(0.9)
     other = with_rows_of(simulation, SCENES["retract"])
     before = constants()
-    assert ("scalpel_sim.simulation", "NO_WRENCH", 0) in before
+    assert ("scalpel_sim.instruments.blade_instrument", "NO_WRENCH", 0) in before
     other.load_state(SimulationState.from_bytes(simulation.save_state().to_bytes()))
     other.step()
     after = constants()

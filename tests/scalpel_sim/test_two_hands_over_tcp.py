@@ -63,7 +63,7 @@ def test_the_contacts_of_each_pad_add_up_to_the_force_on_its_jaw():
     with served(scene) as link:
         simulation = prepare(scene, link)
         simulation.run(0.45)
-        coupling, model = simulation.coupled_bodies[0], simulation.arm.model
+        coupling, model = simulation.coupled_bodies[1], simulation.arm.model
         found = coupling.forces()
         for name in ("left_grasper_jaw_low", "left_grasper_jaw_high"):
             mine = model.geom_bodyid[found.geom] == model.body(name).id

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scalpel_sim.recording.recording import WALL_TIMES, Recording, read_forces
+from scalpel_sim.recording.columns import WALL_TIMES
+from scalpel_sim.recording.recording import Recording, read_forces
 from scalpel_sim.runs.file_names import FINAL, FORCES, PASSING_FILES
 from tissue import FloatArray
 

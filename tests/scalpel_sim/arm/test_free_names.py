@@ -214,7 +214,7 @@ def test_a_body_without_a_name_may_carry_the_blade_beside_a_grasper(tmp_path):
     spec.body("scalpel").name = ""
     (tmp_path / "robots" / "robot.xml").write_text(spec.to_xml(), encoding="utf-8")
     simulation = ran(scene)
-    touching = simulation.coupled_bodies[0].geom_ids
+    touching = simulation.coupled_bodies[1].geom_ids
     blade = simulation.arm.blade.body_id
     assert touching and blade not in simulation.arm.model.geom_bodyid[touching]
 

@@ -46,7 +46,7 @@ class WatchedRun:
         self.simulation, self.led = prepared.simulation, led
         self.frames: list[FrameSeen] = []
         self.address = led.server.address
-        self.simulation.controller = led.hand
+        self.simulation.blade.controller = led.hand
 
     def run(self, seconds: float) -> None:
         """Do frames of so many simulated seconds at real-time speed."""

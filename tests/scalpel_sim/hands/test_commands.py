@@ -1,5 +1,6 @@
 import json
 import math
+from typing import get_args
 
 import msgspec
 import pytest
@@ -16,12 +17,15 @@ from scalpel_sim.hands.commands import (
     Engage,
     Jaws,
     Lead,
+    LeadingCommand,
     Move,
     Release,
     StillThere,
     Turn,
     command_of,
 )
+from scalpel_sim.hands.run_controls import RUN_COMMANDS
+from scalpel_sim.hands.teleoperation import HAND_COMMANDS
 
 ALL = [
     Engage(),
@@ -53,6 +57,11 @@ ALMOST_A_MOVE = st.fixed_dictionaries(
 @pytest.mark.parametrize("command", ALL, ids=lambda command: type(command).__name__)
 def test_a_command_is_read_as_it_was_written(command):
     assert command_of(msgspec.json.encode(command)) == command
+
+
+def test_each_command_has_a_handler():
+    assert RUN_COMMANDS.keys() == set(get_args(Command))
+    assert HAND_COMMANDS.keys() == set(get_args(LeadingCommand))
 
 
 def is_small(command: Command) -> bool:

@@ -10,7 +10,8 @@ import pytest
 from bridge import DeviceClient, LinkError, write_new_key
 from bridge.tcp.keys import read_key
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.recording.columns import shared_columns
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import FORCES, STROKE, SUMMARY
 from tests.scalpel_sim.hands.device_runs import lead_forwards
 from tests.scalpel_sim.hands.driven_view import DeviceRunProcess, assert_a_run_repeats
@@ -35,7 +36,7 @@ def test_devices_lead_a_cut_in_turn_until_one_ends_it_and_a_run_repeats_it_to_th
     summary = json.loads((run.folder / SUMMARY).read_text())
     assert summary["status"] == "complete" and summary["settings"]["tissue_every"] == 2
     forces = read_forces(run.folder / FORCES)
-    assert np.ptp(forces.rows[:, COLUMNS.index("tip_y_m")]) > 0.02
+    assert np.ptp(forces.rows[:, shared_columns().index("tip_y_m")]) > 0.02
     assert summary["cut_area_m2"] > 0.0
     engaged = np.genfromtxt(run.folder / STROKE, delimiter=",", names=True)["engaged"]
     assert np.count_nonzero(np.diff(engaged) > 0.0) >= 2, "it was taken hold of anew"

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.recording.columns import shared_columns
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import FINAL, FORCES, STROKE, SUMMARY
 from scalpel_sim.runs.run import REST_AFTER_STROKE
 from tests.scalpel_sim.hands.driven_view import DrivenView, page_of, token_in
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.end_to_end
 SECONDS = 0.4
 """How long the hand leads [s]."""
 
-N_FORCES = COLUMNS.index("cut_area_m2")
+N_FORCES = shared_columns().index("cut_area_m2")
 """Columns of time, tip and forces, which come first."""
 
 
@@ -53,7 +54,7 @@ def test_a_stroke_that_was_led_for_some_seconds_is_repeated_by_name_to_the_bit(t
     assert command_line(["run", "grid2", *stroke, "-q", "--out", str(again)]) == 0
     assert (led / FINAL).read_bytes() == (again / FINAL).read_bytes()
     rows = [read_forces(folder / FORCES).rows[:, :N_FORCES] for folder in (led, again)]
-    assert np.ptp(rows[0][:, COLUMNS.index("tip_y_m")]) > 0.005
+    assert np.ptp(rows[0][:, shared_columns().index("tip_y_m")]) > 0.005
     assert np.array_equal(*rows)
 
 

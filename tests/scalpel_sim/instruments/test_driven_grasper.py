@@ -138,7 +138,8 @@ def test_a_grasper_that_has_closed_on_a_piece_carries_its_weight():
     weight = tissue.pieces()[0].mass * 9.81
     assert force == pytest.approx([0.0, 0.0, -weight], abs=0.02 * weight)
     assert hand.n_points > 100
-    assert hand.record()[:3] == list(hand.wrench.force) and hand.record()[7] == hand.n_points
+    recorded = hand.columns.values(None)
+    assert recorded[:3] == list(hand.wrench.force) and recorded[7] == hand.n_points
 
 
 def test_the_work_of_the_hand_is_in_the_account_of_energy():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from scalpel_sim.output.cut_account import area_unpaid, energy_released
-from scalpel_sim.recording.recording import COLUMNS, Recording
+from scalpel_sim.recording.columns import shared_columns
+from scalpel_sim.recording.recording import Recording
 
 J = 20.0
 DEPTH, LENGTH, NODE_SIZE = 0.01, 0.06, 0.0035
@@ -37,11 +38,11 @@ def cut(opened=None, paid=1.0, released=0.0, held=0.0):
         "held_j": 1e-3 * J * DEPTH * np.broadcast_to(held, N),
     }
     columns["work_of_blade_j"] = columns["cutting_j"] + columns["released_j"] + columns["held_j"]
-    rows = np.zeros((N + 2 * AIR, len(COLUMNS)))
+    rows = np.zeros((N + 2 * AIR, len(shared_columns())))
     for name, values in columns.items():
-        at = COLUMNS.index(name)
+        at = shared_columns().index(name)
         rows[AIR:-AIR, at], rows[-AIR:, at] = values, values[-1]
-    rows[-AIR:, COLUMNS.index("anchored_length_m")] = 0.0
+    rows[-AIR:, shared_columns().index("anchored_length_m")] = 0.0
     recording = Recording()
     for row in rows:
         recording.append(row.tolist())

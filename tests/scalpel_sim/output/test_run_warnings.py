@@ -12,7 +12,8 @@ from scalpel_sim import Scene, StrokeTable, prepare
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.run_outcome import outcome_of
 from scalpel_sim.output.run_warnings import warnings_of
-from scalpel_sim.recording.recording import COLUMNS, Recording, columns_of_hand
+from scalpel_sim.recording.columns import columns_in, grasper_quantities, shared_columns
+from scalpel_sim.recording.recording import Recording
 from scalpel_sim.runs.run import run_time
 from scalpel_sim.scene.body import GivenBody
 from scalpel_sim.scene.scene import changed
@@ -97,7 +98,7 @@ def with_columns(recording, **changes):
     changed_one = Recording()
     for row in recording.rows.copy():
         for name, change in changes.items():
-            row[COLUMNS.index(name)] = change(row[COLUMNS.index(name)])
+            row[shared_columns().index(name)] = change(row[shared_columns().index(name)])
         changed_one.append(row)
     return changed_one
 
@@ -237,9 +238,9 @@ def test_the_toughness_at_speed_is_that_of_the_edge():
     ],
 )
 def test_a_grasper_that_holds_nothing_is_told(points, kinds):
-    recording = Recording(columns_of_hand("left"))
+    recording = Recording([*shared_columns(), *columns_in(grasper_quantities("left"))])
     for i, n in enumerate(points):
-        recording.append([0.0] * len(COLUMNS) + [0.0] * 6 + [0.02 if i == 0 else 0.005, n])
+        recording.append([0.0] * len(shared_columns()) + [0.0] * 6 + [0.02 if i == 0 else 0.005, n])
     settings = {"graspers": [{"name": "left", "holds": "attachment"}]}
     outcome = replace(pushed(), recording=recording, settings=settings)
     assert [warning.kind for warning in warnings_of(outcome)] == kinds

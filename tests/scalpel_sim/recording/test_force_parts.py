@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
+from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.force_parts import EDGE_COSINE, force_parts
-from scalpel_sim.recording.recording import COLUMNS
 from scalpel_sim.scene.scene import changed
 from tissue import RigidContacts
 
@@ -75,7 +75,7 @@ def test_the_stiffness_of_each_frame_is_that_of_the_tissue_in_the_world(cut):
     last = simulation.recording.rows[-1]
     assert simulation.recording.column("stiffness_yy_n_m").max() > 100.0
     there = simulation.result.stiffness[:3, :3]  # the frames are parallel
-    first = COLUMNS.index("stiffness_xx_n_m")
+    first = shared_columns().index("stiffness_xx_n_m")
     assert last[first : first + 3] == pytest.approx(np.diag(there), rel=1e-12)
 
 

@@ -10,7 +10,8 @@ import pytest
 from scalpel_sim import SCENES
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Engage, Release, Undo
-from scalpel_sim.recording.recording import COLUMNS, Recording, read_forces
+from scalpel_sim.recording.columns import shared_columns
+from scalpel_sim.recording.recording import Recording, read_forces
 from scalpel_sim.runs.file_names import PASSING_FILES, REPLAY_FRAMES
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
@@ -80,7 +81,7 @@ def test_a_frame_that_differs_from_its_row_is_an_error_that_names_it(tmp_path):
     resumption = resumption_of(tmp_path)
     other = Recording()  # as of another machine: its checksums hold
     for row in resumption.recorded.rows.copy():
-        row[COLUMNS.index("tip_x_m")] *= 1.0 + 1e-15
+        row[shared_columns().index("tip_x_m")] *= 1.0 + 1e-15
         other.append(row)
     with pytest.raises(RunError, match=r"frame \d+ is done again, and tip_x_m is"):
         perform_in(tmp_path, SLAB, None, resumption._replace(recorded=other, checkpoint=None))

@@ -22,7 +22,8 @@ from scalpel_sim.output.plots import (
 )
 from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_json
-from scalpel_sim.recording.recording import COLUMNS, TERMS, Recording, columns_of_hand, read_forces
+from scalpel_sim.recording.columns import columns_in, grasper_quantities, shared_columns
+from scalpel_sim.recording.recording import TERMS, Recording, read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, FORCES, PLOT, SUMMARY
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
 from tests.support.run_files import names_in
@@ -59,7 +60,7 @@ def plotter():
 
 def recorded(n_frames: int) -> Recording:
     """Return a random recording whose stage times sum to less than the wall time."""
-    untimed = COLUMNS.index("cd_s") - 1
+    untimed = shared_columns().index("cd_s") - 1
     rng = np.random.default_rng(0)
     recording = Recording()
     for i in range(n_frames):
@@ -95,14 +96,14 @@ def test_forces_csv_reads_back_to_the_same_bits(tmp_path, plotter):
     outputs.write_forces(recording, all_rows=True)
     with (tmp_path / FORCES).open(newline="") as file:
         header, *rows = csv.reader(file)
-    assert header == list(COLUMNS)
+    assert header == list(shared_columns())
     assert np.array_equal(np.array(rows, float), recording.rows)
 
 
 def test_forces_csv_is_written_to_disk_during_the_run(tmp_path, plotter):
     outputs, recording = Outputs(tmp_path, plotter), Recording()
     for i in range(FRAMES_PER_FLUSH + 5):
-        recording.append([float(i)] * len(COLUMNS))
+        recording.append([float(i)] * len(shared_columns()))
         outputs.write_forces(recording)
     assert len((tmp_path / FORCES).read_text().splitlines()) == 1 + FRAMES_PER_FLUSH
 
@@ -195,7 +196,7 @@ def zero_recording(n_frames: int = 100) -> Recording:
     """Return a recording of zeros, to be filled in."""
     recording = Recording()
     for i in range(n_frames):
-        row = dict.fromkeys(COLUMNS, 0.0) | {"time_s": i * DT, "frame_s": 1e-4}
+        row = dict.fromkeys(shared_columns(), 0.0) | {"time_s": i * DT, "frame_s": 1e-4}
         recording.append(list(row.values()))
     return recording
 
@@ -395,9 +396,9 @@ def test_the_shares_sum_to_one():
 def test_the_figures_follow_from_the_frames():
     recording = Recording()
     for i in range(100):
-        row = dict.fromkeys(COLUMNS, 0.0)
+        row = dict.fromkeys(shared_columns(), 0.0)
         row |= {"force_z_n": -2.0 if i < 50 else 0.0, "frame_s": 1e-2 if i == 99 else 1e-4}
-        recording.append([row[name] for name in COLUMNS])
+        recording.append([row[name] for name in shared_columns()])
     summary = summary_of(recording, wall_seconds=0.05)
     assert summary.simulated_seconds == pytest.approx(0.1)
     assert summary.real_time_factor == pytest.approx(2.0)
@@ -417,8 +418,11 @@ def test_a_run_that_ended_before_its_first_frame_has_a_summary_too():
 
 def test_a_row_that_a_killed_run_did_not_finish_is_left_out(tmp_path):
     """Also where the cut is within the last number, which could still be read."""
-    path, rows = tmp_path / "forces.csv", np.arange(2.0 * len(COLUMNS)).reshape(2, -1) + 0.25
-    lines = [",".join(COLUMNS), *(",".join(map(repr, row.tolist())) for row in rows)]
+    path, rows = (
+        tmp_path / "forces.csv",
+        np.arange(2.0 * len(shared_columns())).reshape(2, -1) + 0.25,
+    )
+    lines = [",".join(shared_columns()), *(",".join(map(repr, row.tolist())) for row in rows)]
     whole = "\n".join(lines) + "\n"
     for n_lost in (1, 2, 40):
         path.write_text(whole[:-n_lost])
@@ -432,7 +436,8 @@ def test_a_row_that_a_killed_run_did_not_finish_is_left_out(tmp_path):
 
 def recording_of_hands(*names: str, n_frames: int = 3) -> Recording:
     """Return a recording in which grasper i pulls with i + 1 newtons along x, and holds points."""
-    recording = Recording(others=[column for name in names for column in columns_of_hand(name)])
+    others = [column for name in names for column in columns_in(grasper_quantities(name))]
+    recording = Recording([*shared_columns(), *others])
     for frame in range(n_frames):
         row = dict.fromkeys(recording.columns, 0.0) | {"time_s": frame * DT, "frame_s": 1e-4}
         for i, name in enumerate(names):
@@ -444,7 +449,10 @@ def recording_of_hands(*names: str, n_frames: int = 3) -> Recording:
 
 def test_columns_of_graspers_follow_after_all_others_and_are_read_again(tmp_path, plotter):
     recording = recording_of_hands("left", "helper_2")
-    assert recording.columns[: len(COLUMNS)] == COLUMNS and recording.hands == ("left", "helper_2")
+    assert recording.columns[: len(shared_columns())] == shared_columns() and recording.hands == (
+        "left",
+        "helper_2",
+    )
     outputs = Outputs(tmp_path, plotter, recording.columns)
     outputs.write_forces(recording, all_rows=True)
     outputs.close()
@@ -454,10 +462,31 @@ def test_columns_of_graspers_follow_after_all_others_and_are_read_again(tmp_path
     np.testing.assert_array_equal(found.vector("helper_2_force")[0], [2.0, 0.0, 0.0])
 
 
-def test_a_table_with_half_a_grasper_is_refused(tmp_path):
+def test_a_table_with_half_a_vector_is_refused(tmp_path):
     path = tmp_path / FORCES
-    path.write_text(",".join((*COLUMNS, *columns_of_hand("left")[:-1])) + "\n")
+    path.write_text(",".join((*shared_columns(), "probe_force_x_n", "probe_force_y_n")) + "\n")
     with pytest.raises(ValueError, match="must be the columns of a run"):
+        read_forces(path)
+
+
+def test_columns_are_found_by_name_in_older_files_and_in_those_of_other_instruments(tmp_path):
+    path = tmp_path / FORCES
+    without_stiffness = [name for name in shared_columns() if not name.startswith("stiffness")]
+    columns = [*reversed(without_stiffness[1:]), "probe_opening_m"]
+    row = ",".join(str(i) for i in range(1 + len(columns)))
+    path.write_text(",".join(["time_s", *columns]) + f"\n{row}\n")
+    found = read_forces(path)
+    assert found.column("cut_area_m2") == [1 + columns.index("cut_area_m2")]
+    assert found.column("probe_opening_m") == [len(columns)]
+    assert found.hands == () and found.n_held == 0
+    with pytest.raises(ValueError, match="stiffness_xx_n_m"):
+        found.column("stiffness_xx_n_m")
+
+
+def test_rows_of_another_length_than_the_first_line_are_refused(tmp_path):
+    path = tmp_path / FORCES
+    path.write_text("time_s,probe_opening_m\n1.0,2.0,3.0\n")
+    with pytest.raises(ValueError, match="not as many numbers as columns"):
         read_forces(path)
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from bridge import TissueFrame
+from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, frame_row, shared_columns
 from scalpel_sim.recording.force_parts import force_parts
-from scalpel_sim.recording.frame_row import FrameRows, WallTimes
-from scalpel_sim.recording.recording import COLUMNS
 from tissue import BladeSegment, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -44,6 +43,12 @@ def result_of(rng, n):
     )
 
 
+def row_of(*parts) -> list[float]:
+    """Return the numbers of all columns of a frame, without attachments."""
+    frame = FrameData(*parts, (), WallTimes(*range(5)), 0.0)
+    return frame_row(COLUMNS.values(), frame)
+
+
 @pytest.mark.kernel
 @pytest.mark.parametrize("frame", FRAMES)
 @pytest.mark.parametrize("n", [0, 1, 40])
@@ -51,9 +56,8 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
     rng, there = np.random.default_rng(n), FRAMES[frame]
     result, blade = result_of(rng, n), BladeSegment(*np.linalg.qr(rng.normal(size=(3, 3)))[0])
     felt, raw = (Wrench(*rng.normal(size=(3, 3))) for _ in range(2))
-    times = WallTimes(*range(5))
-    row = FrameRows(there).row_of(0.5, blade, felt, raw, result, times)
-    assert len(row) == len(COLUMNS) - 1
+    row = row_of(0.5, blade, felt, raw, result, there)
+    assert len(row) == len(shared_columns())
     assert row[:4] == [0.5, *blade.tip]
     assert row[4:16] == [*felt.force, *felt.torque, *raw.force, *raw.torque]
     parts = force_parts(result.contacts, there.vectors_to_tissue(blade.forward))
@@ -61,12 +65,11 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
     stiffness = there.matrix_to_world(result.stiffness[:3, :3])
     assert row[25:31] == [stiffness[at] for at in AXES]
     assert row[31:36] == [1.0, 2.0, 3, 4.0, 5.0]
-    assert row[-5:] == list(times) and np.isnan(row[36:-5]).all()
+    assert row[-6:-1] == list(range(5)) and np.isnan(row[36:-6]).all()
 
 
 def test_a_wrench_that_no_limit_changed_is_written_twice():
     rng = np.random.default_rng(0)
     wrench, blade = Wrench(*rng.normal(size=(3, 3))), BladeSegment(*np.eye(3))
-    times = WallTimes(*range(5))
-    row = FrameRows(TissueFrame()).row_of(0.0, blade, wrench, wrench, result_of(rng, 2), times)
+    row = row_of(0.0, blade, wrench, wrench, result_of(rng, 2), TissueFrame())
     assert row[4:10] == row[10:16] == [*wrench.force, *wrench.torque]

@@ -1,0 +1,269 @@
+"""`COLUMNS`: what a row of `forces.csv` holds, a group of columns each.
+
+To add a column, add a `ColumnGroup` to `COLUMNS`: see `docs/extend.md`.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from bridge import TissueFrame
+from scalpel_sim.recording.force_parts import add_up, force_parts
+from tissue import BladeSegment, Energies, FloatArray, StepResult, Wrench
+from tissue.support import kernel
+
+ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
+"""Columns of the energy account since the start: the terms of `tissue.Energies`, and the residual.
+NaN without an audit."""
+
+WALL_TIMES = ("cd_s", "gc_s", "rx_s", "rd_s", "frame_s", "recording_s")
+"""Columns that differ from run to run: what frames took."""
+
+_NO_ACCOUNT = (math.nan,) * len(ACCOUNT)
+"""The energies of a frame without an audit."""
+
+
+class WallTimes(NamedTuple):
+    """Wall times of one frame [s], in the order of the columns."""
+
+    collision: float = 0.0
+    """Collision detection (CD)."""
+    topology: float = 0.0
+    """Geometric changes (GC)."""
+    relaxation: float = 0.0
+    """Relaxation (RX)."""
+    pictures: float = 0.0
+    """Rendering (RD)."""
+    frame: float = 0.0
+    """The whole frame, without pictures and without its recording."""
+
+
+class HeldLoad(Protocol):
+    """What the tissue does to an attachment."""
+
+    @property
+    def wrench(self) -> Wrench:
+        """Wrench of the tissue on it in the frame, tissue frame."""
+
+
+class FrameData(NamedTuple):
+    """One frame at its end: what the numbers of its row are made from."""
+
+    time: float
+    """Simulated time at which the frame began [s]."""
+    blade: BladeSegment
+    """Edge of the blade at the end of the frame, world frame."""
+    felt: Wrench
+    """Wrench that the arm felt in the frame, world frame, about the tip."""
+    raw: Wrench
+    """That wrench before any limit of the device; the same object where none acted."""
+    result: StepResult
+    """Last result of the tissue, tissue frame."""
+    tissue_frame: TissueFrame
+    """Pose of the tissue in the world."""
+    loads: Sequence[HeldLoad]
+    """Load on each frame that acts on the tissue, those of its own scene first; tissue frame."""
+    wall_times: WallTimes
+    """Wall times of the frame and of its stages."""
+    recorded_since: float
+    """Wall clock when the recording of the frame began [s]: `time.perf_counter`."""
+
+
+class ColumnGroup(NamedTuple):
+    """Quantities of a frame that are computed together, as columns of `forces.csv`."""
+
+    quantities: Mapping[str, Sequence[str]]
+    """Columns of each quantity, by its name. A column ends with its unit: `force_x_n` is in N."""
+    values: Callable[[FrameData], Sequence[float]]
+    """Return the numbers of a frame, one for each column, in order."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns."""
+        return columns_in(self.quantities)
+
+
+def columns_in(quantities: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """Return the names of the columns of quantities, in order."""
+    return tuple(name for columns in quantities.values() for name in columns)
+
+
+def columns_of(groups: Iterable[ColumnGroup]) -> tuple[str, ...]:
+    """Return the names of the columns of groups, in order."""
+    return tuple(name for group in groups for name in group.columns)
+
+
+def frame_row(groups: Iterable[ColumnGroup], frame: FrameData) -> list[float]:
+    """Return the numbers of a frame, one for each column of the groups, in order."""
+    row: list[float] = []
+    for group in groups:
+        row += group.values(frame)
+    return row
+
+
+def vector_columns(name: str, unit: str) -> tuple[str, ...]:
+    """Return the three columns of a vector quantity."""
+    return tuple(f"{name}_{axis}_{unit}" for axis in "xyz")
+
+
+def held_group(n: int) -> ColumnGroup:
+    """Return the group of a run with `n` attachments of its scene.
+
+    Each has the force of the tissue on it [N], world frame, averaged over the frame.
+    """
+
+    def forces(frame: FrameData) -> list[float]:
+        to_world = frame.tissue_frame.vectors_to_world
+        loads = frame.loads[:n]
+        return [x for load in loads for x in to_world(load.wrench.force).tolist()]
+
+    return ColumnGroup({f"held_{i}": vector_columns(f"held_{i}", "n") for i in range(n)}, forces)
+
+
+def grasper_quantities(name: str) -> dict[str, tuple[str, ...]]:
+    """Return the quantities of a grasper, which follow after all others.
+
+    Force and torque of the tissue on it in the frame, about the middle between the pads, world
+    frame; the distance between the pads; and how many points of the tissue are attached to it.
+    """
+    return {
+        f"{name}_force": vector_columns(f"{name}_force", "n"),
+        f"{name}_torque": vector_columns(f"{name}_torque", "nm"),
+        f"{name}_opening": (f"{name}_opening_m",),
+        f"{name}_points": (f"{name}_points",),
+    }
+
+
+def _motion(frame: FrameData) -> list[float]:
+    """Return the time, the place of the tip, and the wrench as it is felt and as it is exerted."""
+    return [
+        frame.time,
+        *frame.blade.numbers[:3],
+        *frame.felt.numbers[:6],
+        *frame.raw.numbers[:6],
+    ]
+
+
+def _force_parts(frame: FrameData) -> list[float]:
+    """Return the parts of the force [N], and the stiffness against displacement [N/m]."""
+    there, blade, result = frame.tissue_frame, frame.blade, frame.result
+    contacts, numbers = result.contacts.of_blade, np.empty(15)
+    if there.is_rotated:
+        parts = force_parts(contacts, there.vectors_to_tissue(blade.forward))
+        numbers[:9] = there.vectors_to_world(np.array(parts)).ravel()
+        _write_upper(there.matrix_to_world(result.stiffness[:3, :3]), numbers)
+    else:
+        _write_at_blade(
+            contacts.normal,
+            contacts.normal_force,
+            contacts.friction,
+            result.stiffness,
+            *blade.numbers[6:],
+            numbers,
+        )
+    return numbers.tolist()
+
+
+def _cut(frame: FrameData) -> tuple[float, ...]:
+    """Return what the blade has done to the tissue since the start."""
+    result = frame.result
+    return (
+        result.cut_area,
+        result.finished_area,
+        result.n_tetrahedra,
+        result.anchored_length,
+        result.work_of_blade,
+    )
+
+
+def _account(frame: FrameData) -> tuple[float, ...]:
+    """Return the terms of the energy account, and the residual [J]."""
+    energies = frame.result.energies
+    return _NO_ACCOUNT if energies is None else (*energies[1:], energies.residual)
+
+
+def _wall_times(frame: FrameData) -> tuple[float, ...]:
+    """Return the wall times of the frame [s], and that of its recording so far."""
+    return (*frame.wall_times, time.perf_counter() - frame.recorded_since)
+
+
+COLUMNS: dict[str, ColumnGroup] = {
+    "motion": ColumnGroup(
+        {
+            "time": ("time_s",),
+            "tip": vector_columns("tip", "m"),
+            "force": vector_columns("force", "n"),
+            "torque": vector_columns("torque", "nm"),
+            "tissue_force": vector_columns("tissue_force", "n"),
+            "tissue_torque": vector_columns("tissue_torque", "nm"),
+        },
+        _motion,
+    ),
+    "force_parts": ColumnGroup(
+        {
+            "edge_force": vector_columns("edge_force", "n"),
+            "pressing_force": vector_columns("pressing_force", "n"),
+            "friction_force": vector_columns("friction_force", "n"),
+            "stiffness": [f"stiffness_{ij}_n_m" for ij in ("xx", "yy", "zz", "xy", "xz", "yz")],
+        },
+        _force_parts,
+    ),
+    "cut": ColumnGroup(
+        {
+            "cut_area": ("cut_area_m2",),
+            "finished_area": ("finished_area_m2",),
+            "tetrahedra": ("tetrahedra",),
+            "anchored_length": ("anchored_length_m",),
+            "work_of_blade": ("work_of_blade_j",),
+        },
+        _cut,
+    ),
+    "account": ColumnGroup({"account": ACCOUNT}, _account),
+    "wall_times": ColumnGroup({"wall_times": WALL_TIMES}, _wall_times),
+}
+"""Groups of columns that each run records, in order. Those of attachments and of instruments follow
+after them. Vectors are in the world frame. `force` and `torque` are what the arm feels, averaged
+over the frame, the torque about the tip; `tissue_force` and `tissue_torque` are what the tissue
+exerts, before the limits of the device. `edge_force`, `pressing_force` and `friction_force` are
+what the tissue does to the blade's edge, to its faces, and along them, at the end of the frame;
+`stiffness` is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall
+times of the stages that the paper's Table 1 names: collision detection, geometric changes,
+relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering (`rd_s`)
+and without the recording of its row (`recording_s`: of the columns up to there)."""
+
+
+def shared_columns() -> tuple[str, ...]:
+    """Return the names of the columns that each run has."""
+    return columns_of(COLUMNS.values())
+
+
+@kernel
+def _write_at_blade(
+    normal: FloatArray,
+    normal_force: FloatArray,
+    friction: FloatArray,
+    stiffness: FloatArray,
+    x: float,
+    y: float,
+    z: float,
+    numbers: FloatArray,
+) -> None:
+    """Write `ForceParts` and stiffness of a step, whose frame is parallel to the world.
+
+    `x`, `y`, `z`: unit vector in which the blade cuts. As an array it would have to be made.
+    """
+    add_up(normal, normal_force, friction, (x, y, z), numbers)
+    _write_upper(stiffness, numbers)
+
+
+@kernel
+def _write_upper(stiffness: FloatArray, numbers: FloatArray) -> None:
+    """Write the six different numbers of the stiffness against displacement."""
+    for axis in range(3):
+        numbers[9 + axis] = stiffness[axis, axis]
+    numbers[12] = stiffness[0, 1]
+    numbers[13] = stiffness[0, 2]
+    numbers[14] = stiffness[1, 2]
