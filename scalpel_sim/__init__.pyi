@@ -12,9 +12,12 @@ from .scene.scene import Scene as Scene
 from .scene.scene import changed as changed
 from .scene.schema import GrasperTable as GrasperTable
 from .scene.schema import WaypointTable as WaypointTable
-from .scene.strokes import StrokeTable as StrokeTable
 from .simulation import Simulation as Simulation
 from .state import SimulationState as SimulationState
+from .strokes.kind import LyingBody as LyingBody
+from .strokes.kind import StrokeKind as StrokeKind
+from .strokes.kinds import STROKES as STROKES
+from .strokes.table import StrokeTable as StrokeTable
 from .viewer.viewer import Viewer as Viewer
 
 __all__ = [
@@ -23,11 +26,14 @@ __all__ = [
     "Grasper",
     "GrasperTable",
     "Grip",
+    "LyingBody",
     "SCALPEL",
     "SCENES",
+    "STROKES",
     "Scene",
     "Simulation",
     "SimulationState",
+    "StrokeKind",
     "StrokeTable",
     "Viewer",
     "WaypointTable",

@@ -13,10 +13,11 @@ import msgspec
 from cyclopts import Group, Parameter
 
 from scalpel_sim.runs.options import Flag
-from scalpel_sim.scene.key_texts import has_usual, texts_of, usual_text, with_note
-from scalpel_sim.scene.problems import alternatives, table_of
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import BladeTable, MaterialTable, SolverTable
+from scalpel_sim.strokes.kinds import STROKES
+from scalpel_sim.tables.key_texts import has_usual, texts_of, usual_text, with_note
+from scalpel_sim.tables.problems import alternatives, table_of
 
 SceneName = Annotated[
     str | None,
@@ -78,6 +79,9 @@ _AS_OPTION = {
 
 _WITH_USUAL = ("solver", "arm")
 """Tables whose keys have a usual value that few scenes replace: help shows it."""
+
+PLANNED_STROKES = [name for name, kind in STROKES.items() if kind.is_planned]
+"""Kinds of strokes that need no key but their name."""
 
 _Options = TypeVar("_Options")
 
@@ -169,9 +173,13 @@ class SolverOptions:
 class ArmOptions:
     """The arm, the path of its blade, and how it is coupled to the tissue."""
 
-    stroke: str | None = None
-    """Path of the blade: straight, slanted, curved, stop, incision, press, or a CSV file of poses
-    over time. A scene file has others, and several in turn."""
+    stroke: Annotated[
+        str | None,
+        Parameter(
+            help=f"Path of the blade: {', '.join(PLANNED_STROKES)}, or a CSV file of poses over "
+            "time. A scene file has others, and several in turn."
+        ),
+    ] = None
     speed: float | None = None
     "Speed of the blade along the stroke [m/s]."
 

@@ -21,8 +21,8 @@ from scalpel_sim.runs.run_folder import check_folder
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.served import scene_of
-from scalpel_sim.scene.text_files import is_toml_file
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.tables.text_files import is_toml_file
 
 _log = logging.getLogger("scalpel_sim")
 

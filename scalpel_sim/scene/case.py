@@ -9,11 +9,11 @@ from msgspec import Meta, field
 
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene.body import KEYS_OF_SHAPE, BodyTable
-from scalpel_sim.scene.checks import check_keys
 from scalpel_sim.scene.read import with_files
 from scalpel_sim.scene.schema import BladeTable, PresetMaterialTable
-from scalpel_sim.scene.text_files import as_tables, read_toml
-from scalpel_sim.scene.values import (
+from scalpel_sim.tables.problems import check_keys
+from scalpel_sim.tables.text_files import as_tables, read_toml
+from scalpel_sim.tables.values import (
     FileName,
     Finite,
     Name,

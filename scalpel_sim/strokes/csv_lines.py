@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene.text_files import read_text_file
+from scalpel_sim.tables.text_files import read_text_file
 
 LARGEST_MOTION = 1 << 29
 """Largest file of a motion [byte]: about an hour of a hand with a row each millisecond."""

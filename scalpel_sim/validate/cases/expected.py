@@ -10,7 +10,7 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.case import TIME, CaseContent, ExpectedTable
-from scalpel_sim.scene.text_files import read_text_file
+from scalpel_sim.tables.text_files import read_text_file
 from scalpel_sim.validate.cases.runner import CaseRecord
 from scalpel_sim.validate.findings import CASE, Check
 from tissue import BoolArray, FloatArray

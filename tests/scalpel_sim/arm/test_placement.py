@@ -3,9 +3,9 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
-from scalpel_sim.scene.strokes import PLANNED_STROKES, StrokeTable
 from scalpel_sim.strokes.drawn import drawn_stroke
-from scalpel_sim.strokes.planning import plan_stroke
+from scalpel_sim.strokes.table import StrokeTable
+from tests.support.planned_strokes import PLANNED, plan_stroke
 from tissue import block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
@@ -24,7 +24,7 @@ def in_world(pose, placement):
 
 @pytest.mark.parametrize("preset", ARMS)
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
-@pytest.mark.parametrize("name", PLANNED_STROKES)
+@pytest.mark.parametrize("name", PLANNED)
 def test_both_arms_lead_the_blade_along_every_stroke_and_stay_out_of_the_body(preset, mesh, name):
     stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh), preset)
@@ -62,7 +62,7 @@ def test_the_blade_begins_exactly_at_the_start_of_the_stroke(preset):
 
 
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
-@pytest.mark.parametrize("name", PLANNED_STROKES)
+@pytest.mark.parametrize("name", PLANNED)
 def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(mesh, name):
     stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh))

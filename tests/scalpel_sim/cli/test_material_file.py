@@ -13,9 +13,9 @@ from scalpel_sim.cli.materials import template
 from scalpel_sim.cli.options import BladeOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene, read_figures
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene.key_texts import texts_of
 from scalpel_sim.scene.read import PHANTOM
 from scalpel_sim.scene.schema import BladeTable, MaterialTable
+from scalpel_sim.tables.key_texts import texts_of
 from tissue import MATERIALS, BladeShape, Material
 
 WRONG_FILES = {

@@ -14,7 +14,6 @@ from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.case import CaseContent
 from scalpel_sim.scene.page import with_tables
-from scalpel_sim.scene.problems import kinds_of
 from scalpel_sim.scene.read import (
     SHIPPED_SCENES,
     read_scene_file,
@@ -27,6 +26,7 @@ from scalpel_sim.scene.read import (
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.write import scene_text
+from scalpel_sim.tables.problems import kinds_of
 from tissue import pieces_of
 
 ROOT = Path(__file__).parents[3]
