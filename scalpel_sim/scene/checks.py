@@ -95,11 +95,6 @@ def check_solver(solver: SolverTable, material: Material) -> None:
         )
     if relaxation == "verlet" and material.stiffens:
         raise UsageError(f"--relaxation verlet gains energy under law {material.law}; use global")
-    if not (solver.mass_scaling >= 0.0 and math.isfinite(solver.mass_scaling)):
-        raise UsageError(
-            f"--mass-scaling is {solver.mass_scaling}; it is an angular frequency [1/s], or 0 "
-            "for no added mass"
-        )
 
 
 def check_arm(arm: ArmTable, world: WorldTable) -> None:

@@ -3,8 +3,6 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
-from scalpel_sim.strokes.drawn import drawn_stroke
-from scalpel_sim.strokes.table import StrokeTable
 from tests.support.planned_strokes import PLANNED, plan_stroke
 from tissue import block
 
@@ -94,9 +92,9 @@ def test_a_stroke_out_of_reach_is_refused_with_a_scale_that_is_in_reach(preset, 
 
 
 def test_a_stroke_in_metres_that_is_out_of_reach_is_to_be_drawn_smaller():
-    table = StrokeTable(kind="points", points=[[0.0, -0.6, 0.0], [0.0, 0.6, 0.0]], length=0.04)
+    stroke = plan_stroke("points", SLAB, points=[[0.0, -0.6, 0.0], [0.0, 0.6, 0.0]], length=0.04)
     with pytest.raises(PlacementError, match=r"at 0\.\d+ times the size: draw the stroke smaller$"):
-        place(drawn_stroke(table, 0.06), bounds(SLAB))
+        place(stroke, bounds(SLAB))
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
