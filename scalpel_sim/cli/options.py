@@ -4,7 +4,7 @@ Each group is a dataclass that several commands share. Options that are keys of 
 from its schema. One that is not given is None, and leaves what the scene has.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 import msgspec
 from cyclopts import Group, Parameter
 
+from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.options import Flag
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import BladeTable, MaterialTable, SolverTable
@@ -214,3 +215,18 @@ def given_options(group: Any) -> Iterator[str]:
             yield from given_options(value)
         elif value != field.default:
             yield "set" if field.name == "settings" else field.name.replace("_", "-")
+
+
+def expect_no_options(groups: Sequence[Any], what: str) -> None:
+    """Check that no option of some groups is given.
+
+    Args:
+        groups: The groups.
+        what: What says it already, for the message.
+
+    Raises:
+        UsageError: one is given; the message names it.
+    """
+    for group in groups:
+        for name in given_options(group):
+            raise UsageError(f"--{name} is given with {what}; omit one of them")

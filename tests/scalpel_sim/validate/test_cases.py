@@ -59,7 +59,7 @@ def test_a_bar_is_stretched_as_its_formula_says(tmp_path, capsys):
 
 
 def test_a_blade_cuts_a_block_with_toughness_times_thickness(tmp_path, capsys):
-    words = ["validate", "--case", str(EXAMPLES / "cut.toml"), "--out", str(tmp_path), "--json"]
+    words = ["run", str(EXAMPLES / "cut.toml"), "--out", str(tmp_path), "--json"]
     assert command_line(words) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["pieces"] == 2
@@ -115,6 +115,12 @@ def test_a_case_goes_with_no_option_of_the_scenes(words, capsys):
     case = str(EXAMPLES / "tension.toml")
     assert command_line(["validate", "--case", case, *words]) == 2
     assert "--only and --quick are for the scenes" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [["--young", "1e4"], ["--stroke", "press"], ["--hand", "device"]])
+def test_a_case_has_all_that_options_of_a_scene_say(words, capsys):
+    assert command_line(["run", str(EXAMPLES / "tension.toml"), *words]) == 2
+    assert f"{words[0]} is " in capsys.readouterr().err
 
 
 def test_vectors_are_interpolated_and_stay_after_the_last_time():
