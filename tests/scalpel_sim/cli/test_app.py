@@ -247,20 +247,6 @@ def test_quiet_prints_nothing(files, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
-    words = ["run", "grid2", "--seconds", "0.01", "--json", "--young", "2e4", "--toughness", "7"]
-    assert command_line(words) == 0
-    material = json.loads(capsys.readouterr().out)["settings"]["material"]
-    assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
-
-
-def test_a_prony_series_on_the_command_line_reaches_the_tissue(files, capsys):
-    words = ["run", "grid2", "--seconds", "0.01", "--json", "--law", "neo_hookean"]
-    assert command_line([*words, "--prony", "0.3:0.1,0.2:5"]) == 0
-    material = json.loads(capsys.readouterr().out)["settings"]["material"]
-    assert material["prony"] == [[0.3, 0.1], [0.2, 5.0]]
-
-
 def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):
     coupling_options = [
         "--tissue-every",
