@@ -1,4 +1,4 @@
-"""Lines of a CSV file that holds the motion of an instrument."""
+"""Lines of a CSV file: the motion of an instrument, or a curve."""
 
 import csv
 import math

@@ -174,8 +174,8 @@ def test_a_value_is_that_of_the_rows_between_two_times():
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("x,y\n0,0\n1,nan\n", "line 3: '1,nan' is not two finite numbers"),
-        ("x,y\n0,0\n1\n", "line 3"),
+        ("x,y\n0,0\n1,nan\n", "line 3: 'nan' is not a finite number"),
+        ("x,y\n0,0\n1\n", "line 3: 1 values, wanted 2"),
         ("x,y\n0,1\n", "give two or more"),
         ("x,y\n1,0\n0,1\n", "must ascend"),
         ("x,y\n0,0\n1,0\n", "0 everywhere"),
@@ -189,4 +189,4 @@ def test_a_curve_that_is_none_is_refused(text, expected, tmp_path):
 def test_a_curve_that_is_missing_is_said_before_the_run(tmp_path, capsys):
     shutil.copy(EXAMPLES / "tension.toml", tmp_path)
     assert command_line(["validate", "--case", str(tmp_path / "tension.toml")]) == 2
-    assert "tension.csv cannot be read" in capsys.readouterr().err
+    assert "cannot read the curve" in capsys.readouterr().err
