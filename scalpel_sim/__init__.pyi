@@ -15,7 +15,7 @@ from .scene.schema import WaypointTable as WaypointTable
 from .simulation import Simulation as Simulation
 from .state import SimulationState as SimulationState
 from .strokes.kind import LyingBody as LyingBody
-from .strokes.kind import StrokeKind as StrokeKind
+from .strokes.kind import stroke_kind as stroke_kind
 from .strokes.kinds import STROKES as STROKES
 from .strokes.table import StrokeTable as StrokeTable
 from .viewer.viewer import Viewer as Viewer
@@ -33,7 +33,6 @@ __all__ = [
     "Scene",
     "Simulation",
     "SimulationState",
-    "StrokeKind",
     "StrokeTable",
     "Viewer",
     "WaypointTable",
@@ -42,4 +41,5 @@ __all__ = [
     "changed",
     "prepare",
     "read_scene",
+    "stroke_kind",
 ]

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.stroke import Stroke
@@ -27,14 +27,18 @@ def no_problem(row: StrokeTable) -> None:
     """Find nothing wrong: the keys of the row are all that counts."""
 
 
+Plan = Callable[[StrokeTable, LyingBody], Stroke]
+"""Returns the path of the blade from a row, whose keys are checked, and the body. It raises
+`StrokeError` where no blade can follow it, or the body has no section where it is planned."""
+
+
 class StrokeKind(NamedTuple):
     """A kind of stroke."""
 
     keys: Kind
     """The keys that a row `[[stroke]]` of this kind needs and may have, and what it does."""
-    plan: Callable[[StrokeTable, LyingBody], Stroke]
-    """Returns the path of the blade from a row, whose keys are checked, and the body. It raises
-    `StrokeError` where no blade can follow it, or the body has no section where it is planned."""
+    plan: Plan
+    """Returns the path of the blade."""
     is_planned: bool = False
     """Whether the program places the stroke in the body; else the row says where it is [m]."""
     cuts: bool = True
@@ -48,6 +52,25 @@ class StrokeKind(NamedTuple):
 
 STROKES: dict[str, StrokeKind] = {}
 """The kinds of strokes by name: those of `strokes/kinds`, and what a program adds."""
+
+
+def stroke_kind(
+    about: str, needed: tuple[str, ...] = (), possible: tuple[str, ...] = (), **settings: Any
+) -> Callable[[Plan], Plan]:
+    """Return a decorator that adds a function to `STROKES`, as the plan of the kind of its name.
+
+    Args:
+        about: What the stroke does.
+        needed: Keys that a row must have.
+        possible: Keys that a row may have besides.
+        settings: Other fields of `StrokeKind`.
+    """
+
+    def added(plan: Plan) -> Plan:
+        STROKES[plan.__name__] = StrokeKind(Kind(about, needed, possible), plan, **settings)
+        return plan
+
+    return added
 
 
 def check_positive(what: str, value: float | None, unit: str) -> None:

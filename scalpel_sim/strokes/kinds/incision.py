@@ -12,11 +12,10 @@ import math
 import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.kind import STROKES, LyingBody, StrokeKind
+from scalpel_sim.strokes.kind import LyingBody, stroke_kind
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import timed
-from scalpel_sim.tables.values import Kind
 from tissue import BladeSegment, FloatArray, TetrahedralMesh, boundary_faces
 
 DEPTH, DEPTH_SHARE = 8e-3, 0.3
@@ -60,7 +59,12 @@ _DEGREE = 4
 it jerk."""
 
 
-def _plan(row: StrokeTable, body: LyingBody) -> Stroke:
+@stroke_kind(
+    "the tip goes in from above, is drawn along the body, and is lifted out",
+    possible=("speed", "depth", "along"),
+    is_planned=True,
+)
+def incision(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return an incision along the middle of a body's longer side, seen from above.
 
     The tip is drawn farther by as much as the edge runs ahead of the material that it cuts, for the
@@ -162,15 +166,3 @@ def _followed(legs: list[FloatArray], speed: float) -> tuple[FloatArray, FloatAr
         times.append(times[-1][-1] + when[1:])
         points.append(np.stack([np.interp(done[1:], along, leg[:, k]) for k in range(3)], axis=1))
     return np.concatenate(times), np.concatenate(points)
-
-
-STROKES.update(
-    incision=StrokeKind(
-        Kind(
-            "the tip goes in from above, is drawn along the body, and is lifted out",
-            possible=("speed", "depth", "along"),
-        ),
-        _plan,
-        is_planned=True,
-    )
-)

@@ -1,10 +1,9 @@
 """The stroke `press`: the blade pushed against the body, not far enough to cut."""
 
-from scalpel_sim.strokes.kind import STROKES, LyingBody, StrokeKind, check_positive
+from scalpel_sim.strokes.kind import LyingBody, check_positive, stroke_kind
 from scalpel_sim.strokes.planning import passage_through
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.table import StrokeTable
-from scalpel_sim.tables.values import Kind
 
 PRESS_TOUGHNESS_SHARE = 0.5
 """A press goes as deep as half of what would cut: depth x Young's modulus is a force per length of
@@ -17,7 +16,13 @@ PRESS_DWELL = 0.5
 """Time for which the blade rests at the end of a press [s]: the tissue comes to rest under it."""
 
 
-def _plan(row: StrokeTable, body: LyingBody) -> Stroke:
+@stroke_kind(
+    "the blade pushed against the body, not far enough to cut",
+    possible=("speed", "depth"),
+    is_planned=True,
+    cuts=False,
+)
+def press(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return a stroke against the middle of the body, which ends before it cuts."""
     passage = passage_through(row, body)
     depth = row.depth
@@ -26,15 +31,3 @@ def _plan(row: StrokeTable, body: LyingBody) -> Stroke:
         depth = min(harmless, DEEPEST_PRESS * passage.length)
         check_positive("depth", depth, "m")
     return passage.stroke(passage.first + depth, asks=False, dwell=PRESS_DWELL)
-
-
-STROKES.update(
-    press=StrokeKind(
-        Kind(
-            "the blade pushed against the body, not far enough to cut", possible=("speed", "depth")
-        ),
-        _plan,
-        is_planned=True,
-        cuts=False,
-    )
-)

@@ -2,12 +2,11 @@
 
 import math
 
-from scalpel_sim.strokes.kind import STROKES, LyingBody, StrokeKind
+from scalpel_sim.strokes.kind import LyingBody, stroke_kind
 from scalpel_sim.strokes.planned_sheet import PlannedSheet
 from scalpel_sim.strokes.planning import MiddleSection, passage_through
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.table import StrokeTable
-from scalpel_sim.tables.values import Kind
 
 TILT = math.radians(25.0)
 """Angle by which the slanted sheet leans [rad], where the body is wide enough for it."""
@@ -16,7 +15,12 @@ RAKE = math.radians(15.0)
 """Angle by which the tip of the slanted blade trails its heel [rad]."""
 
 
-def _plan(row: StrokeTable, body: LyingBody) -> Stroke:
+@stroke_kind(
+    "a plane that leans by 25 degrees, with the blade raked by 15, clean through",
+    possible=("speed",),
+    is_planned=True,
+)
+def slanted(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return a stroke along a plane that leans, across the middle of the body."""
     passage = passage_through(row, body, _leaning)
     return passage.stroke(passage.beyond)
@@ -32,15 +36,3 @@ def _leaning(middle: MiddleSection, strength: float) -> PlannedSheet:
         normal=math.cos(tilt) * across - math.sin(tilt) * down,
         rake=strength * RAKE,
     )
-
-
-STROKES.update(
-    slanted=StrokeKind(
-        Kind(
-            "a plane that leans by 25 degrees, with the blade raked by 15, clean through",
-            possible=("speed",),
-        ),
-        _plan,
-        is_planned=True,
-    )
-)

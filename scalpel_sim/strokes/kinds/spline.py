@@ -6,17 +6,21 @@ import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.drawn import KEYS_OF_PATH, SAME_POINT, led_along, missing_points
-from scalpel_sim.strokes.kind import STROKES, LyingBody, StrokeKind
+from scalpel_sim.strokes.kind import LyingBody, stroke_kind
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.table import StrokeTable
-from scalpel_sim.tables.values import Kind
 from tissue import FloatArray
 
 _PER_LEG = 200
 """Points of a spline between two of those that it is given by."""
 
 
-def _plan(row: StrokeTable, body: LyingBody) -> Stroke:
+@stroke_kind(
+    "the tip goes along a smooth curve through the points, without a stop",
+    *KEYS_OF_PATH,
+    problem=missing_points,
+)
+def spline(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return a stroke along a smooth curve through the points of its row, without a stop."""
     return led_along(row, _spline(np.array(row.points)), rests=False)
 
@@ -31,12 +35,3 @@ def _spline(points: FloatArray) -> FloatArray:
     at = np.append(0.0, np.cumsum(chords))
     fine = np.unique(np.concatenate([np.linspace(a, b, _PER_LEG + 1) for a, b in pairwise(at)]))
     return np.asarray(CubicSpline(at, points)(fine))
-
-
-STROKES.update(
-    spline=StrokeKind(
-        Kind("the tip goes along a smooth curve through the points, without a stop", *KEYS_OF_PATH),
-        _plan,
-        problem=missing_points,
-    )
-)
