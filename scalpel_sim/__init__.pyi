@@ -17,9 +17,12 @@ from .scene.scene import Scene as Scene
 from .scene.scene import changed as changed
 from .scene.schema import GrasperTable as GrasperTable
 from .scene.schema import WaypointTable as WaypointTable
-from .scene.strokes import StrokeTable as StrokeTable
 from .simulation import Simulation as Simulation
 from .state import SimulationState as SimulationState
+from .strokes.kind import LyingBody as LyingBody
+from .strokes.kind import stroke_kind as stroke_kind
+from .strokes.kinds import STROKES as STROKES
+from .strokes.table import StrokeTable as StrokeTable
 from .viewer.viewer import Viewer as Viewer
 
 __all__ = [
@@ -33,8 +36,10 @@ __all__ = [
     "Grip",
     "Instrument",
     "OBSERVATIONS",
+    "LyingBody",
     "SCALPEL",
     "SCENES",
+    "STROKES",
     "Scene",
     "Simulation",
     "SimulationState",
@@ -46,4 +51,5 @@ __all__ = [
     "changed",
     "prepare",
     "read_scene",
+    "stroke_kind",
 ]

@@ -17,8 +17,9 @@ import numpy as np
 from benchmarks.timing import TurnWatch
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
-from scalpel_sim.strokes.planning import plan_stroke
+from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.tables import compact_table
 from scalpel_sim.validate.speed.watch import SILENT
@@ -166,7 +167,8 @@ def fault_of(chosen: Variation) -> str:
     tissue.settle()
     body = TetrahedralMesh(tissue.snapshot().positions, mesh.tetrahedra)
     low, high = body.positions.min(axis=0), body.positions.max(axis=0)
-    stroke = plan_stroke(chosen.stroke, body, speed=chosen.speed, material=GEL)
+    row = StrokeTable(kind=chosen.stroke, speed=chosen.speed)
+    stroke = stroke_through(body, [row], GEL)
     shift = chosen.place * (high - low)[0]
     edges = _poses(stroke, 0.5 * (low + high), shift, chosen.yaw)
     sweeps = [BladeSweep(*pair) for pair in itertools.pairwise(edges)]

@@ -25,7 +25,7 @@ from scalpel_sim.arm.place_search import (
 )
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.scene.strokes import DRAWN_STROKES
+from scalpel_sim.strokes.kind import STROKES
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray
 
@@ -293,7 +293,8 @@ def _advice(stroke: Stroke, boxes: FloatArray, preset: str) -> str:
     )
     larger = list(ARMS)[list(ARMS).index(preset) + 1 :]
     other = f", or choose --arm {larger[0]}" if larger else ""
-    is_drawn = not DRAWN_STROKES.keys().isdisjoint(stroke.name.split(", "))
+    kinds = [STROKES[name] for name in stroke.name.split(", ") if name in STROKES]
+    is_drawn = any(not kind.is_planned for kind in kinds)
     # A stroke that is given in metres does not shrink with the body.
     remedy = f"{'draw the stroke' if is_drawn else 'make --scale'} smaller{other}"
     low, high = math.log(SMALLEST_SCALE), 0.0

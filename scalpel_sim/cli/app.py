@@ -2,6 +2,7 @@
 
 import traceback
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,9 +11,14 @@ from cyclopts import App, CycloptsError, Parameter
 from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.cli.explain_command import explain
 from scalpel_sim.cli.new_command import new
-from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
+from scalpel_sim.cli.options import (
+    ArmOptions,
+    SceneName,
+    TissueOptions,
+    expect_no_options,
+)
 from scalpel_sim.cli.spacemouse_command import spacemouse
-from scalpel_sim.cli.validate_command import validate
+from scalpel_sim.cli.validate_command import perform_case, validate
 from scalpel_sim.cli.view_command import view
 from scalpel_sim.cli.warm_up_command import warm_up
 from scalpel_sim.errors import (
@@ -73,6 +79,9 @@ def _run(
 ) -> None:
     """Cut a body with the arm, print a table, and write files to a folder.
 
+    A FILE.toml that is a case (docs/scenes.md) is run as `validate --case` does: its records are
+    compared with what it expects, and the exit code is 3 where that is missed.
+
     For example:
 
     ```console
@@ -80,6 +89,7 @@ def _run(
     scalpel-sim run slab --stroke curved --toughness 10
     scalpel-sim run organ --material liver --blade-thickness 0.001 --out out/liver
     scalpel-sim run --mesh organ.msh --scale 0.001 --fix bottom --material mine.toml
+    scalpel-sim run docs/examples/tension.toml
     scalpel-sim run --hand device --listen 127.0.0.1:8767
     scalpel-sim run --resume out/organ
     ```
@@ -94,6 +104,8 @@ def _run(
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.runs.device_run import check_device_options, device_run, perform_device
         from scalpel_sim.runs.prepared_run import perform_script
+        from scalpel_sim.scene.case import is_case
+        from scalpel_sim.tables.text_files import is_toml_file
 
         options = RunOptions(tissue, arm, client, output, printing)
         is_led = hand == "device"
@@ -108,6 +120,14 @@ def _run(
             expect_no_warnings(summary, output)
             return
         check_device_options(device, is_led=is_led)
+        if scene is not None and is_toml_file(scene) and is_case(Path(scene)):
+            expect_no_options(
+                (tissue, arm, client, replace(output, out=None)),
+                f"the case {scene}, which has all that it does",
+            )
+            if is_led:
+                raise UsageError("--hand is for a scene, and this is a case; omit it")
+            return perform_case(Path(scene), output.out, printing)
         relaxation = "verlet" if is_led else None
         with prepared_run(
             scene, options, audits=not is_led, relaxation=relaxation, is_led=is_led

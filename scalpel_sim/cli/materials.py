@@ -15,10 +15,10 @@ from rich.table import Table
 from scalpel_sim.cli.new_command import write_new_file
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene.blade import SCALPEL, table_of_blade
-from scalpel_sim.scene.key_texts import texts_of
 from scalpel_sim.scene.read import PHANTOM, SCENES
 from scalpel_sim.scene.schema import BladeTable, MaterialTable
-from scalpel_sim.scene.text_files import SUFFIX
+from scalpel_sim.tables.key_texts import texts_of
+from scalpel_sim.tables.text_files import SUFFIX
 from tissue import DAMPING_BAND, MATERIALS, Material, Preset, SourcedValue
 
 _KPA_PER_PA = 1e-3

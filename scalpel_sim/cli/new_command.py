@@ -34,7 +34,7 @@ def new(
         force: Replace the file if it exists.
     """
     from scalpel_sim.scene.read import shipped_path, shipped_scene
-    from scalpel_sim.scene.text_files import SUFFIX
+    from scalpel_sim.tables.text_files import SUFFIX
 
     with log_to_stderr(printing):
         shipped_scene(scene)  # refuses an unknown one

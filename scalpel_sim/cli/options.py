@@ -4,7 +4,7 @@ Each group is a dataclass that several commands share. Options that are keys of 
 from its schema. One that is not given is None, and leaves what the scene has.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
@@ -12,11 +12,13 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 import msgspec
 from cyclopts import Group, Parameter
 
+from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.options import Flag
-from scalpel_sim.scene.key_texts import has_usual, texts_of, usual_text, with_note
-from scalpel_sim.scene.problems import alternatives, table_of
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import BladeTable, MaterialTable, SolverTable
+from scalpel_sim.strokes.kind import STROKES
+from scalpel_sim.tables.key_texts import has_usual, texts_of, usual_text, with_note
+from scalpel_sim.tables.problems import alternatives, table_of
 
 SceneName = Annotated[
     str | None,
@@ -78,6 +80,9 @@ _AS_OPTION = {
 
 _WITH_USUAL = ("solver", "arm")
 """Tables whose keys have a usual value that few scenes replace: help shows it."""
+
+PLANNED_STROKES = [name for name, kind in STROKES.items() if kind.is_planned]
+"""Kinds of strokes that need no key but their name."""
 
 _Options = TypeVar("_Options")
 
@@ -169,9 +174,13 @@ class SolverOptions:
 class ArmOptions:
     """The arm, the path of its blade, and how it is coupled to the tissue."""
 
-    stroke: str | None = None
-    """Path of the blade: straight, slanted, curved, stop, incision, press, or a CSV file of poses
-    over time. A scene file has others, and several in turn."""
+    stroke: Annotated[
+        str | None,
+        Parameter(
+            help=f"Path of the blade: {', '.join(PLANNED_STROKES)}, or a CSV file of poses over "
+            "time. A scene file has others, and several in turn."
+        ),
+    ] = None
     speed: float | None = None
     "Speed of the blade along the stroke [m/s]."
 
@@ -206,3 +215,18 @@ def given_options(group: Any) -> Iterator[str]:
             yield from given_options(value)
         elif value != field.default:
             yield "set" if field.name == "settings" else field.name.replace("_", "-")
+
+
+def expect_no_options(groups: Sequence[Any], what: str) -> None:
+    """Check that no option of some groups is given.
+
+    Args:
+        groups: The groups.
+        what: What says it already, for the message.
+
+    Raises:
+        UsageError: one is given; the message names it.
+    """
+    for group in groups:
+        for name in given_options(group):
+            raise UsageError(f"--{name} is given with {what}; omit one of them")

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from scalpel_sim.cli.options import given_options
+from scalpel_sim.cli.options import expect_no_options
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
@@ -36,7 +36,10 @@ def perform_resumed(
         RunError: another run writes there, or the run failed.
         OSError: a file cannot be read.
     """
-    _expect_no_options(options)
+    given = (options.tissue, options.arm, options.client)
+    expect_no_options(given, "--resume, which goes on with what the run was asked for")
+    if options.output.out is not None:
+        raise UsageError("--out is given with --resume, which writes to its folder; omit --out")
     if folder.is_dir():
         check_folder(folder)  # no run writes there
     resumption = resumption_of(folder)
@@ -49,26 +52,6 @@ def perform_resumed(
     options = options._replace(output=replace(options.output, out=folder, export=exports))
     with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
         return perform_script(prepared, plotter, resumption=resumption), prepared
-
-
-def _expect_no_options(options: RunOptions) -> None:
-    """Refuse options that say what is in the folder already.
-
-    Raises:
-        UsageError: one is given; the message names it.
-    """
-    given = [
-        name
-        for group in (options.tissue, options.arm, options.client)
-        for name in given_options(group)
-    ]
-    if options.output.out is not None:
-        given.append("out")
-    if given:
-        raise UsageError(
-            f"--{given[0]} is given with --resume, which goes on with what the run was asked for; "
-            "omit one of them"
-        )
 
 
 def _end_records(folder: Path, resumption: Resumption) -> None:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
 from scalpel_sim.cli.options import ArmOptions, MaterialOptions, TissueOptions, given_options
 from scalpel_sim.cli.scene_options import chosen_scene, led_elsewhere, scene_in_file
-from scalpel_sim.cli.steps_of_frames import check_steps_of_frames
 from scalpel_sim.errors import Interrupted, UsageError
 from scalpel_sim.output.export import check_exports
 from scalpel_sim.preparation.prepare import prepare
@@ -21,8 +20,9 @@ from scalpel_sim.runs.run_folder import check_folder
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.served import scene_of
-from scalpel_sim.scene.text_files import is_toml_file
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.tables.text_files import is_toml_file
+from tissue import MANY_SUBSTEPS, MOST_SUBSTEPS
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -201,6 +201,27 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
             "calibration": scene.material.as_keys()["spring_calibration"],
         }
     }
+
+
+def check_steps_of_frames(simulation: Simulation) -> None:
+    """Refuse frames that take so many Runge-Kutta steps that nothing can end one; warn of many.
+
+    Raises:
+        UsageError: a frame takes more than `MOST_SUBSTEPS`.
+    """
+    measures = simulation.link.cut_report().now
+    n_steps = simulation.dt / measures.time_step
+    if n_steps <= MANY_SUBSTEPS:
+        return
+    reason = "elements are small, stiff or light"
+    remedy = "Check --scale, or lower --young, or raise --density"
+    if measures.undamped_steps(simulation.dt) <= MANY_SUBSTEPS:
+        reason = "damping is strong"
+        remedy = "Lower viscous_damping or retardation_time of its [material]"
+    found = f"a frame takes {n_steps:.4g} Runge-Kutta steps, because the tissue's {reason}"
+    if n_steps > MOST_SUBSTEPS:
+        raise UsageError(f"{found}; at most {MOST_SUBSTEPS:,} are done. {remedy}")
+    _log.warning("%s: the run will take long. %s", found, remedy)
 
 
 def _checkpoint_seconds(options: RunOptions) -> float:

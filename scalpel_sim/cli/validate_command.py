@@ -38,7 +38,8 @@ def validate(
     The exit code is 3 where a check is out of its bounds by more than is known and explained in
     the report.
 
-    With `--case` an experiment of yours is run instead, and compared with what its file expects.
+    With `--case` an experiment of yours is run instead, and compared with what its file expects, as
+    `run FILE.toml` does.
     For example:
 
     ```console
@@ -58,7 +59,7 @@ def validate(
     if case is not None:
         if only or quick:
             raise UsageError("--case runs one experiment; --only and --quick are for the scenes")
-        _validate_case(case, out or Path("out") / case.stem, printing)
+        perform_case(case, out, printing)
         return
     from scalpel_sim.output.summary import versions
     from scalpel_sim.runs.prepared_run import load_kernels
@@ -89,8 +90,13 @@ def validate(
         raise CheckError(f"{checks} out of bounds; see {out / PAGE_FILE}")
 
 
-def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
+def perform_case(path: Path, out: Path | None, printing: PrintOptions) -> None:
     """Run the case in a file; print and write what it found.
+
+    Args:
+        path: The file.
+        out: Folder of what it writes; None for `out/` and the name of the file.
+        printing: What is printed.
 
     Raises:
         UsageError: the file, or a file that it names, is wrong.
@@ -103,6 +109,7 @@ def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
     from scalpel_sim.validate.cases.expected import check_expected, curves_of
     from scalpel_sim.validate.cases.report import CaseFindings, case_as_json, print_case, write_case
 
+    out = out or Path("out") / path.stem
     case = read_case(path)
     curves = curves_of(case)
     make_folder(out)

@@ -11,9 +11,9 @@ from scalpel_sim.arm.hand import Hand
 from scalpel_sim.hands.limited_pose import LimitedPose
 from scalpel_sim.instruments.blade_instrument import BLADE
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
-from scalpel_sim.scene.values import WIDEST_OPENING
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint, edge_of_grasper
 from scalpel_sim.strokes.stroke import Stroke, poses_of_edges
+from scalpel_sim.tables.values import WIDEST_OPENING
 from tissue import BladeSegment, FloatArray
 
 JAW_SPEED = 0.03

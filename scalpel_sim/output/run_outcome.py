@@ -12,6 +12,7 @@ from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import first_areas
 from scalpel_sim.strokes.asked_pieces import asked_pieces, n_large
 from scalpel_sim.strokes.expected_force import length_inside
+from scalpel_sim.strokes.kind import STROKES
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
     FloatArray,
@@ -101,8 +102,8 @@ class RunOutcome:
     @property
     def was_to_cut(self) -> bool:
         """Whether the stroke says that it cuts, wherever the body is then."""
-        kinds = [each["kind"] for each in self.settings.get("strokes", ())]
-        return bool(self.stroke.asked) or "stop" in kinds
+        kinds = [STROKES[each["kind"]] for each in self.settings.get("strokes", ())]
+        return bool(self.stroke.asked) or any(kind.ends_inside for kind in kinds)
 
     def cut_between(self, start: float, end: float) -> float:
         """Return the area that was cut between two instants [m2]."""

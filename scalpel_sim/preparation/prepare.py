@@ -26,7 +26,7 @@ from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.planning import check_meets
-from scalpel_sim.strokes.scene_stroke import stroke_through
+from scalpel_sim.strokes.scene_stroke import cuts_somewhere, stroke_through
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import TetrahedralMesh
 
@@ -133,8 +133,8 @@ def _add_graspers(
 
 
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:
-    """Return what the cut will take; nothing for a press, which is not to cut."""
-    if stroke.name == "press":
+    """Return what the cut will take; nothing for strokes that are not to cut."""
+    if not (stroke.is_led or cuts_somewhere(scene.strokes)):
         return ExpectedForce(0.0, 0.0)
     if stroke.is_led:  # its whole edge may be in the tissue
         return ExpectedForce(highest_toughness(scene) * stroke.blade_length, stroke.blade_length)

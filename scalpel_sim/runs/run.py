@@ -22,10 +22,10 @@ from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import ViewTable
-from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.scene.write import relative_path, scene_text
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
 

@@ -1,18 +1,13 @@
 """Scenes: one schema, from which the reader, the writer, options and pages are made.
 
-values      what a key may hold
 schema      the tables of a scene file, each key with its unit, bounds and meaning
 body        the table of the body, and its mesh
-strokes     the table of a stroke, and the kinds of strokes
 case        the tables of a case: supports, loads, records and expectations
 scene       a scene: all its tables, and the objects of the engine that they describe
 checks      what makes no sense together
-problems    what is wrong with a file, and where
-text_files  reads text files and TOML files
 read        the file, the environment and other layers: one merge, one conversion
 write       from a scene to a file that gives the same run
 served      a scene around a body in another process
-key_texts   the meaning of each key, for help, templates and pages
 blade       the blade of a scene
 shipped/    the scenes that come with the project
 """

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from scalpel_sim.scene.values import (
+from scalpel_sim.tables.values import (
     CellCounts,
     CellSizes,
     FileName,

@@ -9,11 +9,11 @@ from msgspec import Meta, field
 
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene.body import KEYS_OF_SHAPE, BodyTable
-from scalpel_sim.scene.checks import check_keys
-from scalpel_sim.scene.read import with_files
+from scalpel_sim.scene.read import read_scene_file, with_files
 from scalpel_sim.scene.schema import BladeTable, PresetMaterialTable
-from scalpel_sim.scene.text_files import as_tables, read_toml
-from scalpel_sim.scene.values import (
+from scalpel_sim.tables.problems import check_keys
+from scalpel_sim.tables.text_files import as_tables, read_toml
+from scalpel_sim.tables.values import (
     FileName,
     Finite,
     Name,
@@ -163,6 +163,15 @@ class CaseContent(TomlTable, kw_only=True, frozen=True):
     """What is recorded."""
     expected: list[ExpectedTable] = field(default_factory=list)
     """What the records should be."""
+
+
+def is_case(path: Path) -> bool:
+    """Return whether a TOML file is that of a case, which records, and not of a scene.
+
+    Raises:
+        UsageError: the file cannot be read.
+    """
+    return "record" in read_scene_file(path).content
 
 
 def read_case(path: Path) -> CaseContent:

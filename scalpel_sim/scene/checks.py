@@ -2,10 +2,9 @@
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
-import msgspec
 import numpy as np
 
 from bridge import VirtualCoupling
@@ -19,8 +18,6 @@ from scalpel_sim.scene.schema import (
     WaypointTable,
     WorldTable,
 )
-from scalpel_sim.scene.strokes import STROKES, StrokeTable
-from scalpel_sim.scene.values import Kind
 from tissue import Material
 
 SCHEMES = ("stellar", "paper")
@@ -40,9 +37,6 @@ ARM_CHOICES = ("auto", "touch", "premium")
 
 LONGEST_RUN = 3600.0
 """Longest simulated time of a run [s]: more is taken for a typing error."""
-
-FASTEST_STROKE = 1.0
-"""Highest speed of a stroke [m/s]: no surgeon cuts as fast."""
 
 _SMALLEST_TILT = 1e-6
 """Sine of the angle between the line of sight and `up` below which a picture has no upper side."""
@@ -103,11 +97,6 @@ def check_solver(solver: SolverTable, material: Material) -> None:
         raise UsageError(
             f"--relaxation verlet gains energy under law {material.law.name}; use global"
         )
-    if not (solver.mass_scaling >= 0.0 and math.isfinite(solver.mass_scaling)):
-        raise UsageError(
-            f"--mass-scaling is {solver.mass_scaling}; it is an angular frequency [1/s], or 0 "
-            "for no added mass"
-        )
 
 
 def check_arm(arm: ArmTable, world: WorldTable) -> None:
@@ -162,64 +151,6 @@ def check_range(stretch: float, gravity: float, seconds: float | None) -> None:
         raise UsageError(f"gravity is {gravity} m/s2; it must lie between 0 and 100")
     if seconds is not None and not 0.0 < seconds <= LONGEST_RUN:
         raise UsageError(f"seconds is {seconds}; it must be above 0 and at most {LONGEST_RUN:g}")
-
-
-def check_keys(table: msgspec.Struct, where: str, kind_key: str, kinds: Mapping[str, Kind]) -> None:
-    """Check that the keys of a table are those of its kind. Keys of no kind belong to all.
-
-    Args:
-        table: The table; a key that is not given is None.
-        where: Its name as a file writes it.
-        kind_key: The key that says of which kind it is.
-        kinds: The keys of each kind.
-
-    Raises:
-        UsageError: one is missing, or belongs to another kind.
-    """
-    kind = getattr(table, kind_key)
-    own = kinds[kind]
-    for key in own.needed:
-        if getattr(table, key) is None:
-            raise UsageError(f'{where} of {kind_key} "{kind}" has no {key}')
-    for owner, keys in kinds.items():
-        for key in (*keys.needed, *keys.possible):
-            if key not in (*own.needed, *own.possible) and getattr(table, key) is not None:
-                keys_of_own = ", ".join((*own.needed, *own.possible)) or f"none besides {kind_key}"
-                raise UsageError(
-                    f'{where} of {kind_key} "{kind}" has the key {key}, which belongs to '
-                    f'{kind_key} "{owner}"; it has {keys_of_own}'
-                )
-
-
-def check_strokes(strokes: Sequence[StrokeTable]) -> None:
-    """Check that each stroke exists, and has what its kind needs.
-
-    Raises:
-        UsageError: there is none, no such kind, a key belongs to another, or numbers make no sense.
-    """
-    if not strokes:
-        raise UsageError("the scene has no stroke; give at least one [[stroke]]")
-    for i, stroke in enumerate(strokes):
-        _check_stroke(stroke, f"[[stroke]] number {i + 1}")
-
-
-def _check_stroke(stroke: StrokeTable, where: str) -> None:
-    check_choice("stroke", stroke.kind, tuple(STROKES))
-    check_keys(stroke, where, "kind", STROKES)
-    if stroke.speed is not None and stroke.speed > FASTEST_STROKE:
-        raise UsageError(
-            f"{where} speed is {stroke.speed} m/s; it must be above 0 and at most "
-            f"{FASTEST_STROKE:g}"
-        )
-    if (stroke.saw_amplitude is None) != (stroke.saw_frequency is None):
-        raise UsageError(f"{where} has one of saw_amplitude and saw_frequency; give both or none")
-    n_points = len(stroke.points or ())
-    if stroke.kind in ("points", "spline") and n_points < 2:
-        raise UsageError(f'{where} of kind "{stroke.kind}" has one point; it needs two or more')
-    if stroke.kind == "stab" and n_points != 1:
-        raise UsageError(
-            f'{where} of kind "stab" has {n_points} points; it has one, where the tip goes in'
-        )
 
 
 def check_attachment(table: AttachmentTable, where: str) -> None:

@@ -11,16 +11,19 @@ from pathlib import Path
 import msgspec
 
 from scalpel_sim.scene.case import CaseContent
-from scalpel_sim.scene.key_texts import has_usual, texts_of, usual_text
-from scalpel_sim.scene.problems import as_toml, kinds_of, row_table_of, table_of
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import WaypointTable
-from scalpel_sim.scene.strokes import DRAWN_STROKES, PLANNED_STROKES
-from scalpel_sim.scene.values import Kind
+from scalpel_sim.strokes.kind import STROKES
+from scalpel_sim.tables.key_texts import has_usual, texts_of, usual_text
+from scalpel_sim.tables.problems import as_toml, kinds_of, row_table_of, table_of
+from scalpel_sim.tables.values import Kind
 
 _PLACE = re.compile(r"(<!-- keys of (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
-_KINDS = {"planned": PLANNED_STROKES, "drawn": DRAWN_STROKES}
+_KINDS = {
+    place: {name: kind.keys for name, kind in STROKES.items() if kind.is_planned == is_planned}
+    for place, is_planned in (("planned", True), ("drawn", False))
+}
 
 
 def with_tables(page: str) -> str:

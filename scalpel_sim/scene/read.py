@@ -14,7 +14,8 @@ import msgspec
 from msgspec import structs
 
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.scene.problems import (
+from scalpel_sim.scene.scene import Scene
+from scalpel_sim.tables.problems import (
     Problem,
     kinds_of,
     metas_of,
@@ -22,8 +23,7 @@ from scalpel_sim.scene.problems import (
     row_table_of,
     table_of,
 )
-from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.text_files import read_toml
+from scalpel_sim.tables.text_files import read_toml
 
 _SHIPPED = Path(__file__).parent / "shipped"
 

@@ -17,10 +17,8 @@ from scalpel_sim.scene.checks import (
     check_arm,
     check_attachment,
     check_graspers,
-    check_keys,
     check_range,
     check_solver,
-    check_strokes,
     check_views,
     virtual_coupling,
 )
@@ -34,8 +32,10 @@ from scalpel_sim.scene.schema import (
     ViewTable,
     WorldTable,
 )
-from scalpel_sim.scene.strokes import DEFAULT_SPEED, StrokeTable, stroke_called
-from scalpel_sim.scene.values import NameOfScene, Positive, Text, TomlTable
+from scalpel_sim.strokes.scene_stroke import check_strokes
+from scalpel_sim.strokes.table import StrokeTable, stroke_called
+from scalpel_sim.tables.problems import check_keys
+from scalpel_sim.tables.values import NameOfScene, Positive, Text, TomlTable
 from tissue import MATERIALS, BladeShape, CutSettings, Material, TetrahedralMesh
 
 GEL = Material(blade_friction=MATERIALS["gelatin"].blade_friction.value)
@@ -136,7 +136,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     @property
     def speed(self) -> float:
         """Highest speed of the blade's tip in a stroke whose speed is given [m/s]."""
-        return max(stroke.speed or DEFAULT_SPEED for stroke in self.strokes)
+        return max(stroke.tip_speed for stroke in self.strokes)
 
     def virtual_coupling(self) -> VirtualCoupling | None:
         """Return the coupling of the arm's blade to the one that cuts; None where they are one."""
@@ -145,7 +145,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     @property
     def recorded_files(self) -> list[Path]:
         """Files of motions that a hand did, which the scene repeats."""
-        strokes = [each.file for each in self.strokes if each.kind == "recorded"]
+        strokes = [each.file for each in self.strokes]
         motions = [each.recorded for each in self.graspers]
         return [Path(file) for file in (*strokes, *motions) if file is not None]
 

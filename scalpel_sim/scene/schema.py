@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from scalpel_sim.scene.values import (
+from scalpel_sim.tables.values import (
     Angle,
     Every,
     FileName,

@@ -1,4 +1,4 @@
-"""Lines of a CSV file that holds the motion of an instrument."""
+"""Lines of a CSV file: the motion of an instrument, or a curve."""
 
 import csv
 import math
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene.text_files import read_text_file
+from scalpel_sim.tables.text_files import read_text_file
 
 LARGEST_MOTION = 1 << 29
 """Largest file of a motion [byte]: about an hour of a hand with a row each millisecond."""

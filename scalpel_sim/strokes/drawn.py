@@ -1,15 +1,21 @@
-"""Strokes that are given point by point: along lines, along a spline, in and out, or recorded."""
+"""Strokes whose tip goes along points that are given."""
 
 import math
 from itertools import pairwise
 
 import numpy as np
 
-from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.stroke import Stroke, from_csv
+from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import SAMPLE, SPEED_UP_TIME, timed
 from tissue import BladeSegment, FloatArray
+
+KEYS_OF_PATH = (
+    ("points", "length"),
+    ("edge", "forward", "slicing_ratio", "saw_amplitude", "saw_frequency", "speed"),
+)
+"""Keys that a stroke along points needs, and that it may have."""
 
 _UP = (0.0, 0.0, 1.0)
 
@@ -17,62 +23,55 @@ _TURN_RATE = 2.0 * math.pi
 """How fast the blade turns about its tip where a path has a corner [rad/s]: half a second for a
 right angle and a ramp would be slow, a tenth would throw the tissue about."""
 
-_PER_LEG = 200
-"""Points of a spline between two of those that it is given by."""
-
 _PER_SAW = 40
 """Poses in a period of a saw: a line between two of them is within 0.4 % of the amplitude."""
 
-_SAME_POINT = 1e-9
+SAME_POINT = 1e-9
 """Distance [m] below which two points of a path in turn are one, and give no direction."""
 
 
-def drawn_stroke(table: StrokeTable, speed: float) -> Stroke:
-    """Return the stroke of a table whose kind is one of `DRAWN_STROKES`.
+def missing_points(row: StrokeTable) -> str | None:
+    """Return that a path has too few points; None where it has enough."""
+    return None if len(row.points or ()) >= 2 else "has one point; it needs two or more"
+
+
+def led_along(
+    row: StrokeTable, points: FloatArray, *, rests: bool = True, asks: bool = True
+) -> Stroke:
+    """Return the stroke of a blade whose tip goes along points.
 
     Args:
-        table: The table, which `check_stroke` has passed.
-        speed: Speed of the tip between its ramps [m/s].
+        row: Gives length, edge, direction, speed, and motion along the edge.
+        points: Corners of the path of the tip [m], shape (n, 3).
+        rests: Whether the blade rests at each corner, and turns there; else it passes.
+        asks: Whether the whole path is to be cut; else that is not known.
 
     Raises:
         StrokeError: no blade can follow it; the message says why.
     """
-    if table.kind == "recorded":
-        assert table.file is not None
-        return from_csv(table.file)
-    assert table.points is not None and table.length is not None
-    points = np.array(table.points)
-    edge = np.array(table.edge or _UP)
-    if not edge.any():
-        raise StrokeError("the edge of the stroke is [0, 0, 0]; it is the direction tip to heel")
-    edge = edge / np.linalg.norm(edge)
-    if table.kind == "stab":
-        assert table.depth is not None
-        points = np.array([points[0], points[0] - table.depth * edge, points[0]])
-    elif table.kind == "spline":
-        points = _spline(points)
-    forwards = _forwards(points, edge, table.forward)
-    rests = table.kind != "spline"
-    times, tips, directions = _led(points, forwards, speed, rests=rests)
-    times, tips, directions = _along_edge(table, edge, times, tips, directions)
+    assert row.length is not None
+    edge = edge_direction(row)
+    forwards = _forwards(points, edge, row.forward)
+    times, tips, directions = _led(points, forwards, row.tip_speed, rests=rests)
+    times, tips, directions = _along_edge(row, edge, times, tips, directions)
     poses = [
-        BladeSegment(tip, tip + table.length * edge, forward)
+        BladeSegment(tip, tip + row.length * edge, forward)
         for tip, forward in zip(tips, directions, strict=True)
     ]
-    asked = None if table.kind == "stab" else [(0.0, float(times[-1]))]
-    return Stroke(times, poses, table.kind, asked=asked)
+    asked = [(0.0, float(times[-1]))] if asks else None
+    return Stroke(times, poses, row.kind, asked=asked)
 
 
-def _spline(points: FloatArray) -> FloatArray:
-    """Return points close together on a cubic spline through some, by chord length [m]."""
-    from scipy.interpolate import CubicSpline  # 0.2 s, and only here
+def edge_direction(row: StrokeTable) -> FloatArray:
+    """Return the direction from tip to heel, a unit vector of shape (3,).
 
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if (chords <= _SAME_POINT).any():
-        raise StrokeError("two points of the spline in turn are the same; leave one out")
-    at = np.append(0.0, np.cumsum(chords))
-    fine = np.unique(np.concatenate([np.linspace(a, b, _PER_LEG + 1) for a, b in pairwise(at)]))
-    return np.asarray(CubicSpline(at, points)(fine))
+    Raises:
+        StrokeError: its length is 0.
+    """
+    edge = np.array(row.edge or _UP)
+    if not edge.any():
+        raise StrokeError("the edge of the stroke is [0, 0, 0]; it is the direction tip to heel")
+    return np.asarray(edge / np.linalg.norm(edge))
 
 
 def _forwards(
@@ -84,7 +83,7 @@ def _forwards(
     moves = np.diff(points, axis=0)
     across = moves - np.outer(moves @ edge, edge)
     lengths = np.linalg.norm(across, axis=1)
-    still = lengths <= _SAME_POINT
+    still = lengths <= SAME_POINT
     if still.any():
         leg = int(np.argmax(still))
         raise StrokeError(
@@ -125,24 +124,24 @@ def _led(
 
 
 def _along_edge(
-    table: StrokeTable, edge: FloatArray, times: FloatArray, tips: FloatArray, forwards: FloatArray
+    row: StrokeTable, edge: FloatArray, times: FloatArray, tips: FloatArray, forwards: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Add the motion along the edge of a slice or a saw."""
-    if table.slicing_ratio is not None:
+    if row.slicing_ratio is not None:
         steps = np.diff(tips, axis=0)
         along = np.append(
             0.0, np.linalg.norm(steps - np.outer(steps @ edge, edge), axis=1).cumsum()
         )
         # In the middle of its way the tip is where the points say.
-        tips = tips + np.outer(table.slicing_ratio * (along - 0.5 * along[-1]), edge)
-    if table.saw_amplitude is not None and table.saw_frequency is not None:
-        n = math.ceil((times[-1] - times[0]) * max(1.0 / SAMPLE, _PER_SAW * table.saw_frequency))
+        tips = tips + np.outer(row.slicing_ratio * (along - 0.5 * along[-1]), edge)
+    if row.saw_amplitude is not None and row.saw_frequency is not None:
+        n = math.ceil((times[-1] - times[0]) * max(1.0 / SAMPLE, _PER_SAW * row.saw_frequency))
         fine = np.union1d(times, np.linspace(times[0], times[-1], n + 1))
         fine = fine[np.append(True, np.diff(fine) > 1e-9)]
         tips, forwards = _interpolated(fine, times, tips), _interpolated(fine, times, forwards)
         to_ends = np.minimum(fine - fine[0], fine[-1] - fine)
         grown = np.minimum(to_ends / SPEED_UP_TIME, 1.0)
-        saw = table.saw_amplitude * grown * np.sin(2.0 * np.pi * table.saw_frequency * fine)
+        saw = row.saw_amplitude * grown * np.sin(2.0 * np.pi * row.saw_frequency * fine)
         tips, times = tips + np.outer(saw, edge), fine
     return times, tips, forwards
 

@@ -1,29 +1,19 @@
-"""Strokes that are planned for a body: through its middle, along its upper side, or against it."""
+"""Strokes along a sheet that is planned across the middle of a body."""
 
 import logging
-import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.errors import unknown
-from scalpel_sim.scene.strokes import DEFAULT_SPEED, PLANNED_STROKES
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.expected_force import is_inside
-from scalpel_sim.strokes.incision import DRAG_SHARE, INSERTED_AT, WITHDRAWN_AT, plan_incision
+from scalpel_sim.strokes.kind import LyingBody
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
 from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
-
-TILT = math.radians(25.0)
-"""Angle by which the slanted sheet leans [rad], where the body is wide enough for it."""
-
-RAKE = math.radians(15.0)
-"""Angle by which the tip of the slanted blade trails its heel [rad]."""
-
-SAGITTA = 0.11
-"""Height of the curved sheet's bend, as a fraction of the section's length."""
 
 WIDEST = 0.3
 """How far a sheet may stray from its middle towards the held sides, as a fraction of the body's
@@ -58,92 +48,107 @@ LARGEST_DISPLACEMENT = 0.5
 is stretched between its held sides like a string, which bending and shear do not cover."""
 
 SLIP_SHARE = 0.3
-"""Part of the body's displacement that may be along the edge: the sine of `RAKE`, and a reserve."""
-
-STOP_SHARE, STOP_LATEST = 0.55, 0.9
-"""Fraction of the section's length at which the stroke `stop` ends, and at which it ends at the
-latest where the body is displaced first."""
-
-PRESS_TOUGHNESS_SHARE = 0.5
-"""A press goes as deep as half of what would cut: depth x Young's modulus is a force per length of
-edge, of the size of the toughness where cutting begins."""
-
-DEEPEST_PRESS = 0.1
-"""Deepest press that is planned by itself, as a fraction of the section's length."""
-
-PRESS_DWELL = 0.5
-"""Time for which the blade rests at the end of a press [s]: the tissue comes to rest under it."""
+"""Part of the body's displacement that may be along the edge: the sine of
+the rake of a slanted blade, and a reserve."""
 
 _log = logging.getLogger("scalpel_sim")
 
 
-def plan_stroke(
-    name: str,
-    mesh: TetrahedralMesh,
-    *,
-    speed: float = DEFAULT_SPEED,
-    material: Material = Material(),
-    depth: float | None = None,
-    lowest: float = -math.inf,
-    along: tuple[float, float] = (INSERTED_AT, WITHDRAWN_AT),
-) -> Stroke:
-    """Return the stroke of that name, placed through (or against) the middle of the body.
+class MiddleSection(NamedTuple):
+    """A section of a body across its middle, or near it."""
 
-    Sheets part the body's left from its right (low x from high x). The edge lies along the shorter
-    extent of the section, the motion along the other: down into a thin sheet that stands on edge,
-    else from front to back with the tip down.
+    sheet: PlannedSheet
+    """The plane through it, on which the edge moves along the longer extent of the section: down
+    into a thin sheet that stands on edge, else from front to back with the tip down."""
+    length: float
+    """Extent of the section along the motion [m]."""
+    thickness: float
+    """Extent of the section along the edge [m]."""
+    width: float
+    """Width of the body along x [m]."""
+
+    def room(self, strength: float) -> float:
+        """Return how far a sheet may stray from the plane [m], with a fraction of full tilt."""
+        return strength * WIDEST * self.width
+
+
+Bend = Callable[[MiddleSection, float], PlannedSheet]
+"""Returns the sheet through a section, with a fraction of its full tilt or bend."""
+
+
+class Passage(NamedTuple):
+    """A sheet through a body, and where the blade enters and leaves the body on it."""
+
+    row: StrokeTable
+    """Gives the name and the speed of the stroke."""
+    lowest: float
+    """Height below which the edge is not led [m]."""
+    sheet: PlannedSheet
+    """The sheet."""
+    first: float
+    """Travel at which the blade meets the body [m]."""
+    length: float
+    """Travel from there to where the blade leaves it [m]."""
+    depths: tuple[float, float]
+    """Smallest and largest depth of the body along the edge [m]."""
+    displacement: float
+    """How far the blade displaces the body before it cuts [m], roughly."""
+    beyond: float
+    """Travel at which a stroke ends that goes through [m]."""
+
+    def stroke(self, end: float, *, asks: bool = True, dwell: float = 0.0) -> Stroke:
+        """Return the stroke along the sheet.
+
+        Args:
+            end: Travel at its end [m].
+            asks: Whether the whole path is to be cut; else that is not known.
+            dwell: How long the blade rests at the end [s].
+        """
+        sheet, speed = self.sheet, self.row.tip_speed
+        before = max(_GAP + GAP_SHARE * self.length, 0.5 * speed * SPEED_UP_TIME)
+        low, high = self.depths
+        margin = _BLADE_MARGIN + BLADE_MARGIN_SHARE * (high - low) + SLIP_SHARE * self.displacement
+        heel = low - margin
+        end, tip = sheet.ending_at(self.lowest, end, heel, high + margin)
+        times, travels = _timed(sheet, self.first - before, end, speed)
+        segments = sheet.blade(travels, heel, tip)
+        if dwell > 0.0:
+            times, segments = np.append(times, times[-1] + dwell), [*segments, segments[-1]]
+        asked = [(0.0, float(times[-1]))] if asks else None
+        return Stroke(times, segments, self.row.kind, asked=asked)
+
+
+def passage_through(row: StrokeTable, body: LyingBody, bend: Bend | None = None) -> Passage:
+    """Return a passage through the middle of a body.
+
+    Sheets part the body's left from its right (low x from high x).
 
     Args:
-        name: One of `PLANNED_STROKES`.
-        mesh: The body as it lies before the stroke, tissue frame [m].
-        speed: Speed of the blade between its ramps [m/s].
-        material: What the body is made of: how far the blade displaces it, and how deep a press may
-            go.
-        depth: Depth of a press [m], None for half of what would cut; or of an incision, None for
-            8 mm, or a share of a thin body.
-        lowest: Height below which the edge is not led [m]: the upper side of a table or a floor
-            that stops it. An incision does not come near it.
-        along: Where an incision goes in and out, as shares of the body's length.
+        row: The stroke.
+        body: The body.
+        bend: Tilts or bends the sheet; None for a plane.
 
     Raises:
-        UsageError: no stroke has this name.
-        StrokeError: the speed or the depth is not a positive number, or the body has no section.
+        StrokeError: the body has no section.
     """
-    if name not in PLANNED_STROKES:
-        raise unknown("stroke", name, PLANNED_STROKES)
-    _check_positive("speed", speed, "m/s")
-    if name == "incision":
-        if depth is not None:
-            _check_positive("depth", depth, "m")
-        drag = DRAG_SHARE * material.toughness / material.young_modulus
-        return plan_incision(mesh, speed=speed, depth=depth, drag=drag, along=along)
+    mesh = body.mesh
     edges = mesh_edges(mesh.tetrahedra)
-    sheet = _sheet(name, mesh, edges)
+    sheet = _sheet(row.kind, mesh, edges, bend)
     cut = section(mesh.positions, edges, sheet.height(mesh.positions))
     travels, depths = sheet.travel(cut), sheet.depth(cut)
     first, last = float(travels.min()), float(travels.max())
-    length = last - first
-    start = first - max(_GAP + GAP_SHARE * length, 0.5 * speed * SPEED_UP_TIME)
-    thickness = float(np.ptp(depths))
-    displacement = _displacement(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
-    end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + displacement
-    if name == "stop":
-        end = first + min(STOP_SHARE * length + displacement, STOP_LATEST * length)
-    if name == "press":
-        if depth is None:
-            harmless = PRESS_TOUGHNESS_SHARE * material.toughness / material.young_modulus
-            depth = min(harmless, DEEPEST_PRESS * length)
-        _check_positive("depth", depth, "m")
-        end = first + depth
-    margin = _BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * displacement
-    heel, tip = float(depths.min()) - margin, float(depths.max()) + margin
-    end, tip = sheet.ending_at(lowest, end, heel, tip)
-    times, travels = _timed(sheet, start, end, speed)
-    segments = sheet.blade(travels, heel, tip)
-    if name == "press":
-        times, segments = np.append(times, times[-1] + PRESS_DWELL), [*segments, segments[-1]]
-    asked = None if name in ("stop", "press") else [(0.0, float(times[-1]))]
-    return Stroke(times, segments, name, asked=asked)
+    length, width = last - first, float(np.ptp(mesh.positions[:, 0]))
+    displacement = _displacement(width, length, float(np.ptp(depths)), body.material)
+    return Passage(
+        row,
+        body.lowest,
+        sheet,
+        first,
+        length,
+        (float(depths.min()), float(depths.max())),
+        displacement,
+        beyond=last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + displacement,
+    )
 
 
 def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
@@ -166,44 +171,43 @@ def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
         )
 
 
-def _sheet(name: str, mesh: TetrahedralMesh, edges: IntArray) -> PlannedSheet:
+def _sheet(kind: str, mesh: TetrahedralMesh, edges: IntArray, bend: Bend | None) -> PlannedSheet:
     """Return the first sheet that parts the body in two, or else the first of all."""
     from tissue.support import components  # loads numba
 
     pieces, _ = components(len(mesh.positions), edges)
     first = None
-    for sheet in _candidates(name, mesh, edges):
+    for sheet in _candidates(mesh, edges, bend):
         if _divides(sheet, mesh, edges, pieces):
             return sheet
         first = first or sheet
     if first is None:
         raise StrokeError("the body has no section across its middle; is it in two pieces?")
-    _log.warning("no %s stroke near the middle of the body parts it in exactly two", name)
+    _log.warning("no %s stroke near the middle of the body parts it in exactly two", kind)
     return first
 
 
-def _candidates(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Iterator[PlannedSheet]:
+def _candidates(
+    mesh: TetrahedralMesh, edges: IntArray, bend: Bend | None
+) -> Iterator[PlannedSheet]:
     """Yield sheets for a stroke, the best first: in the middle, and with full tilt or bend."""
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     width = float(high[0] - low[0])
-    for strength in (1.0, 0.5):
+    for strength in (1.0,) if bend is None else (1.0, 0.5):
         for shift in SHIFTS:
             x = 0.5 * (low[0] + high[0]) + shift * width
             cut = section(mesh.positions, edges, mesh.positions[:, 0] - x)
             if len(cut):
-                yield _sheet_at(name, cut, width, strength)
-        if name not in ("slanted", "curved"):
-            return
+                middle = _middle_section(cut, width)
+                yield middle.sheet if bend is None else bend(middle, strength)
 
 
-def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> PlannedSheet:
-    """Return the sheet of a stroke through the middle of a section that is normal to x.
+def _middle_section(cut: FloatArray, width: float) -> MiddleSection:
+    """Return a section that is normal to x.
 
     Args:
-        name: One of `PLANNED_STROKES`.
         cut: Points of the section [m], shape (n, 3).
-        width: Width of the body along x [m]; tilt and bend stay within a share of it.
-        strength: Fraction of the full tilt or bend.
+        width: Width of the body along x [m].
     """
     low, high = cut.min(axis=0), cut.max(axis=0)
     extent = high - low
@@ -211,18 +215,9 @@ def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> Plan
     level = extent[1] < ABOUT_EQUAL * extent[2]
     motion, down = (-z, y) if level else (y, -z)
     length, thickness = float(extent @ np.abs(motion)), float(extent @ np.abs(down))
-    room = strength * WIDEST * width
-    sheet = PlannedSheet((low + high) / 2.0, motion, down, x)
-    if name == "slanted":
-        tilt = min(strength * TILT, math.atan2(room, 0.5 * thickness))
-        return sheet._replace(
-            down=math.cos(tilt) * down + math.sin(tilt) * x,
-            normal=math.cos(tilt) * x - math.sin(tilt) * down,
-            rake=strength * RAKE,
-        )
-    if name == "curved":
-        return sheet._replace(sagitta=min(strength * SAGITTA * length, room), chord=length)
-    return sheet
+    return MiddleSection(
+        PlannedSheet((low + high) / 2.0, motion, down, x), length, thickness, width
+    )
 
 
 def _divides(sheet: PlannedSheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) -> bool:
@@ -292,12 +287,6 @@ def _distance(stroke: Stroke, mesh: TetrahedralMesh) -> float:
     skin = surface(mesh.positions, boundary_faces(mesh.tetrahedra))
     distance: float = fcl.distance(skin, surface(swept, strips))
     return max(0.0, distance)
-
-
-def _check_positive(what: str, value: float, unit: str) -> None:
-    """Refuse a speed or depth that is not positive."""
-    if not (math.isfinite(value) and value > 0.0):
-        raise StrokeError(f"the {what} of the stroke is {value} {unit}; it must be positive")
 
 
 def _millimetres(point: FloatArray) -> str:

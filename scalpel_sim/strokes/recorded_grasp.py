@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from scalpel_sim.scene.values import WIDEST_OPENING
 from scalpel_sim.strokes.csv_lines import StrokeError, numbered_lines, numbers_of
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint, edge_of_grasper
 from scalpel_sim.strokes.stroke import FASTEST
+from scalpel_sim.tables.values import WIDEST_OPENING
 
 GRASP_COLUMNS = (
     "t",

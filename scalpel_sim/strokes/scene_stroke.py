@@ -1,51 +1,74 @@
-"""From the strokes that a scene asks for to the path of its blade."""
+"""From the rows `[[stroke]]` of a scene to the path of its blade."""
 
 import math
 from collections.abc import Sequence
 
-from scalpel_sim.scene.strokes import DEFAULT_SPEED, PLANNED_STROKES, StrokeTable
-from scalpel_sim.strokes.drawn import drawn_stroke
-from scalpel_sim.strokes.incision import INSERTED_AT, WITHDRAWN_AT
-from scalpel_sim.strokes.planning import plan_stroke
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.strokes.kind import STROKES, LyingBody, check_positive
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.table import StrokeTable
+from scalpel_sim.tables.problems import check_keys
 from tissue import Material, TetrahedralMesh
+
+FASTEST_STROKE = 1.0
+"""Highest speed of a stroke [m/s]: no surgeon cuts as fast."""
 
 
 def stroke_through(
     mesh: TetrahedralMesh,
     strokes: Sequence[StrokeTable],
-    material: Material,
+    material: Material = Material(),
     lowest: float = -math.inf,
 ) -> Stroke:
     """Return the path of the blade that does the strokes of a scene in turn.
 
     Args:
         mesh: The body as it lies before the first, tissue frame [m].
-        strokes: What the scene asks for.
-        material: What the body is made of.
-        lowest: Height below which no planned stroke leads the edge [m]; see `plan_stroke`.
+        strokes: Rows of the scene, which `check_strokes` has passed.
+        material: Material of the body.
+        lowest: Height below which no planned stroke leads the edge [m]; see `LyingBody`.
 
     Raises:
-        UsageError: there is no such stroke.
-        StrokeError: no blade can follow it, or the body has no section where it is planned.
+        StrokeError: a speed or a depth is not positive, no blade can follow it, or the body has no
+            section where it is planned.
     """
-    paths = [_path(mesh, table, material, lowest) for table in strokes]
-    rests = [(table.wait, table.pause) for table in strokes]
-    return in_turn(paths, rests, mesh)
+    body = LyingBody(mesh, material, lowest)
+    for row in strokes:
+        check_positive("speed", row.speed, "m/s")
+        check_positive("depth", row.depth, "m")
+    paths = [STROKES[row.kind].plan(row, body) for row in strokes]
+    return in_turn(paths, [(row.wait, row.pause) for row in strokes], mesh)
 
 
-def _path(mesh: TetrahedralMesh, table: StrokeTable, material: Material, lowest: float) -> Stroke:
-    """Return the path of one stroke."""
-    speed = DEFAULT_SPEED if table.speed is None else table.speed
-    if table.kind in PLANNED_STROKES:
-        return plan_stroke(
-            table.kind,
-            mesh,
-            speed=speed,
-            material=material,
-            depth=table.depth,
-            along=table.along or (INSERTED_AT, WITHDRAWN_AT),
-            lowest=lowest,
-        )
-    return drawn_stroke(table, speed)
+def cuts_somewhere(strokes: Sequence[StrokeTable]) -> bool:
+    """Return whether one of the strokes is to cut."""
+    return any(STROKES[row.kind].cuts for row in strokes)
+
+
+def check_strokes(strokes: Sequence[StrokeTable]) -> None:
+    """Check that each stroke exists, and has what its kind needs.
+
+    Raises:
+        UsageError: there is none, no such kind, a key belongs to another, or numbers make no sense.
+    """
+    if not strokes:
+        raise UsageError("the scene has no stroke; give at least one [[stroke]]")
+    keys = {name: kind.keys for name, kind in STROKES.items()}
+    for i, row in enumerate(strokes):
+        where = f"[[stroke]] number {i + 1}"
+        if row.kind not in STROKES:
+            raise unknown("stroke", row.kind, STROKES)
+        check_keys(row, where, "kind", keys)
+        if row.speed is not None and row.speed > FASTEST_STROKE:
+            raise UsageError(
+                f"{where} speed is {row.speed} m/s; it must be above 0 and at most "
+                f"{FASTEST_STROKE:g}"
+            )
+        if (row.saw_amplitude is None) != (row.saw_frequency is None):
+            raise UsageError(
+                f"{where} has one of saw_amplitude and saw_frequency; give both or none"
+            )
+        problem = STROKES[row.kind].problem(row)
+        if problem is not None:
+            raise UsageError(f'{where} of kind "{row.kind}" {problem}')

@@ -11,7 +11,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from tissue.blade.anchors import (
+from tissue.blade.blade_state import BladeState
+from tissue.blade.blunt_contact import BluntContacts, blunt_side
+from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
+from tissue.blade.edge_anchors import (
     ANCHORED,
     RETRACTED,
     Anchors,
@@ -20,28 +23,24 @@ from tissue.blade.anchors import (
     pulling_point,
     surplus_stretch,
 )
-from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import (
+from tissue.blade.faces_contact import POINTS, contact_point, penetration
+from tissue.blade.spine_contact import (
     HEEL_END,
     PIERCING,
     PRESSING,
     TIP_END,
-    BluntContacts,
-    blunt_side,
     press_of,
     tip_toughness,
     touched_point,
 )
-from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
-from tissue.blade.side_contact import POINTS, contact_point, penetration
 from tissue.contact.response.contacts import PenaltyForces
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import dot, norm, sub
-from tissue.geometry.connected_components import components
 from tissue.loads.attachment import Attachment
 from tissue.loads.ligament import Ligament
 from tissue.mesh.body import Body
+from tissue.mesh.pieces import components
 from tissue.stepping.stages import StepStages
 from tissue.types import RigidContacts
 

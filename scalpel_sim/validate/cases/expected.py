@@ -1,7 +1,5 @@
 """Compares the records of a case with the curves and values that it expects."""
 
-import csv
-import io
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -10,13 +8,10 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.case import TIME, CaseContent, ExpectedTable
-from scalpel_sim.scene.text_files import read_text_file
+from scalpel_sim.strokes.csv_lines import numbered_lines, numbers_of
 from scalpel_sim.validate.cases.runner import CaseRecord
 from scalpel_sim.validate.findings import CASE, Check
 from tissue import BoolArray, FloatArray
-
-LARGEST_CURVE = 1 << 24
-"""Largest file of a curve [byte]: half a million rows."""
 
 
 class ExpectedCurve(NamedTuple):
@@ -34,17 +29,8 @@ def read_curve(path: Path) -> ExpectedCurve:
     Raises:
         UsageError: the file cannot be read, a row is not two finite numbers, or x does not ascend.
     """
-    try:
-        file = io.StringIO(read_text_file(path, LARGEST_CURVE))
-        lines = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
-    except (UsageError, csv.Error) as error:
-        raise UsageError(f"{path} cannot be read as CSV: {error}") from error
-    rows = []
-    for number, row in lines[1:]:
-        values = [_number(text) for text in row]
-        if len(values) != 2 or not all(map(math.isfinite, values)):
-            raise UsageError(f"{path}, line {number}: '{','.join(row)}' is not two finite numbers")
-        rows.append(values)
+    _, *lines = numbered_lines(path, "curve", ("x", "y"))
+    rows = [numbers_of(path, *line, [0, 1]) for line in lines]
     if len(rows) < 2:
         raise UsageError(f"{path} holds {len(rows)} rows below its line of names; give two or more")
     x, y = np.array(rows).T
@@ -110,11 +96,3 @@ def _deviation(x: FloatArray, y: FloatArray, curve: ExpectedCurve) -> float:
         return math.nan
     found = np.interp(curve.x, x, y)
     return float(np.abs(found - curve.y).max() / np.abs(curve.y).max())
-
-
-def _number(text: str) -> float:
-    """Return a number; NaN where the text is none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan

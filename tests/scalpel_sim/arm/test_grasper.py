@@ -16,7 +16,7 @@ from scalpel_sim.arm.grasper import (
     add_grasper,
 )
 from scalpel_sim.arm.hand import Impedance, add_hand
-from scalpel_sim.scene.values import WIDEST_OPENING
+from scalpel_sim.tables.values import WIDEST_OPENING
 
 FLANGE = """
 <mujoco>

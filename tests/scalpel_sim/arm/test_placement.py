@@ -3,9 +3,7 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
-from scalpel_sim.scene.strokes import PLANNED_STROKES, StrokeTable
-from scalpel_sim.strokes.drawn import drawn_stroke
-from scalpel_sim.strokes.planning import plan_stroke
+from tests.support.planned_strokes import PLANNED, plan_stroke
 from tissue import block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
@@ -24,7 +22,7 @@ def in_world(pose, placement):
 
 @pytest.mark.parametrize("preset", ARMS)
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
-@pytest.mark.parametrize("name", PLANNED_STROKES)
+@pytest.mark.parametrize("name", PLANNED)
 def test_both_arms_lead_the_blade_along_every_stroke_and_stay_out_of_the_body(preset, mesh, name):
     stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh), preset)
@@ -62,7 +60,7 @@ def test_the_blade_begins_exactly_at_the_start_of_the_stroke(preset):
 
 
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
-@pytest.mark.parametrize("name", PLANNED_STROKES)
+@pytest.mark.parametrize("name", PLANNED)
 def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(mesh, name):
     stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh))
@@ -94,9 +92,9 @@ def test_a_stroke_out_of_reach_is_refused_with_a_scale_that_is_in_reach(preset, 
 
 
 def test_a_stroke_in_metres_that_is_out_of_reach_is_to_be_drawn_smaller():
-    table = StrokeTable(kind="points", points=[[0.0, -0.6, 0.0], [0.0, 0.6, 0.0]], length=0.04)
+    stroke = plan_stroke("points", SLAB, points=[[0.0, -0.6, 0.0], [0.0, 0.6, 0.0]], length=0.04)
     with pytest.raises(PlacementError, match=r"at 0\.\d+ times the size: draw the stroke smaller$"):
-        place(drawn_stroke(table, 0.06), bounds(SLAB))
+        place(stroke, bounds(SLAB))
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():

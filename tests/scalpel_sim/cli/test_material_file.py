@@ -1,4 +1,3 @@
-import json
 import math
 import re
 import tomllib
@@ -13,40 +12,24 @@ from scalpel_sim.cli.materials import template
 from scalpel_sim.cli.options import BladeOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene, read_figures
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene.key_texts import texts_of
 from scalpel_sim.scene.read import PHANTOM
 from scalpel_sim.scene.schema import BladeTable, MaterialTable
+from scalpel_sim.tables.key_texts import texts_of
 from tissue import MATERIALS, BladeShape, Material
 
 WRONG_FILES = {
     "no file": (None, r"cannot be read: No such file.*materials --write"),
-    "not a text file": (b"\xff\xfe\x00", "is not a text file"),
-    "invalid TOML": ("[material]\nyoung_modulus 5", r"is not valid TOML: .*line 2"),
     "nothing": ("", r"has no table \[material\]; .*materials --write"),
-    "no table": ("young_modulus = 5e3", r"stands in no table; write \[material\]"),
     "the name of the option as a key": ("[material]\nyoung = 5e3", "Did you mean 'young_modulus'"),
-    "a key of the other table": (
-        "[material]\nheight = 0.01",
-        r"height, which belongs to \[blade\]",
-    ),
-    "a text for a number": ('[material]\ndensity = "heavy"', 'density is "heavy"; .* above 0'),
-    "a Poisson's ratio of 1/2": ("[material]\npoisson_ratio = 0.5", "0 to below 0.5"),
-    "one pair for a series": ("[material]\nprony = [0.3, 0.1]", r"\[\[g, tau\], ...\]"),
     "a series that leaves nothing": (
         '[material]\nlaw = "neo_hookean"\nprony = [[0.6, 0.1], [0.5, 1]]',
         r"mine.toml: \[material\]: prony has g whose sum is 1.1",
-    ),
-    "an unknown law": ('[material]\nlaw = "hooke"', '"hooke"; .*"springs" or "neo_hook'),
-    "a ratio that the law cannot have": (
-        '[material]\nlaw = "springs"\npoisson_ratio = 0.1',
-        "poisson_ratio is 0.1; springs",
     ),
 }
 
 WRONG_BLADES = {
     "the other table alone": ("[material]\ndensity = 1000", r"has no table \[blade\]"),
     "a bevel that is too steep": ("[blade]\nbevel_degrees = 80", "80 degrees; at most 60"),
-    "bevels that do not fit": ("[blade]\nthickness = 0.01", "only 0.006 m high"),
 }
 
 
@@ -210,19 +193,6 @@ def test_an_unused_table_gets_a_warning(tmp_path, caplog):
     assert f"add --blade {path}" in caplog.text
     chosen_scene("slab", options(None, blade=path))
     assert f"add --material {path}" in caplog.text
-
-
-def test_a_material_from_a_file_reaches_the_tissue(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.toml").write_text(
-        "[material]\nyoung_modulus = 2e4\n[blade]\nthickness = 0.001\n"
-    )
-    words = ["run", "grid2", "--seconds", "0.01", "--json", "--material", "mine.toml"]
-    assert command_line([*words, "--blade", "mine.toml", "--toughness", "7"]) == 0
-    settings = json.loads(capsys.readouterr().out)["settings"]
-    assert settings["material"]["young_modulus"] == 2e4
-    assert settings["material"]["toughness"] == 7.0
-    assert settings["blade"]["thickness"] == 0.001
 
 
 @pytest.mark.parametrize("option", ["--material", "--blade"])

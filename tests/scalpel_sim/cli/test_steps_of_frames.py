@@ -7,7 +7,7 @@ import pytest
 
 from bridge import InProcessLink
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.cli.steps_of_frames import check_steps_of_frames
+from scalpel_sim.cli.run_setup import check_steps_of_frames
 from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.file_names import FORCES, SUMMARY
 from tissue import Material, Tissue, block
@@ -47,7 +47,7 @@ def test_a_body_whose_frames_no_signal_could_end_is_refused_and_earlier_files_st
     assert run(tmp_path) == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert {FORCES, SUMMARY} < set(before)
-    monkeypatch.setattr("scalpel_sim.cli.steps_of_frames.MOST_SUBSTEPS", 300)
+    monkeypatch.setattr("scalpel_sim.cli.run_setup.MOST_SUBSTEPS", 300)
     assert run(tmp_path, *STIFF) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert re.search(r"error: a frame takes [\d,]+ .*; at most 300 are done.*--young", said)

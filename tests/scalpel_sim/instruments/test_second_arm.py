@@ -24,7 +24,7 @@ from scalpel_sim.instruments.second_arm import (
     preset_with_grasper,
 )
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
-from scalpel_sim.strokes.planning import plan_stroke
+from tests.support.planned_strokes import plan_stroke
 from tissue import Tissue, block
 
 ROBOT = Path(__file__).parents[3] / "docs" / "examples" / "robot.xml"

@@ -9,12 +9,11 @@ import pytest
 
 from scalpel_sim import SCENES, prepare, read_scene
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.cli.options import ArmOptions, BodyOptions, MaterialOptions, TissueOptions
+from scalpel_sim.cli.options import ArmOptions, BodyOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.case import CaseContent
 from scalpel_sim.scene.page import with_tables
-from scalpel_sim.scene.problems import kinds_of
 from scalpel_sim.scene.read import (
     SHIPPED_SCENES,
     read_scene_file,
@@ -27,6 +26,7 @@ from scalpel_sim.scene.read import (
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.write import scene_text
+from scalpel_sim.tables.problems import kinds_of
 from tissue import pieces_of
 
 ROOT = Path(__file__).parents[3]
@@ -200,11 +200,6 @@ def test_the_scene_of_the_page_cuts_a_block_into_three(tmp_path):
 
 
 # Options
-
-
-def test_an_option_names_itself_in_its_error():
-    with pytest.raises(UsageError, match=r"^--young is -1\.0; it must be a number above 0"):
-        chosen_scene("slab", TissueOptions(material=MaterialOptions(young=-1.0)))
 
 
 def test_an_option_of_the_stroke_replaces_all_of_them():

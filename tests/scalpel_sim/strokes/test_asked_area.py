@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.asked_area import asked_area, first_areas
-from scalpel_sim.strokes.incision import DEPTH, INSERTED_AT, SLOPE, WITHDRAWN_AT, plan_incision
-from scalpel_sim.strokes.planning import plan_stroke
+from scalpel_sim.strokes.kinds.incision import (
+    DEPTH,
+    INSERTED_AT,
+    SLOPE,
+    WITHDRAWN_AT,
+)
 from scalpel_sim.strokes.scene_stroke import stroke_through
+from scalpel_sim.strokes.table import StrokeTable
+from tests.support.planned_strokes import plan_incision, plan_stroke
 from tissue import MATERIALS, Material, Snapshot, TetrahedralMesh, block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
@@ -57,7 +62,7 @@ def test_an_incision_asks_for_its_depth_over_its_length_and_not_for_what_it_is_d
     body, length = lying(SLAB), (WITHDRAWN_AT - INSERTED_AT) * 0.06
     wanted = DEPTH * length + 0.5 * DEPTH**2 / math.tan(SLOPE)
     for drag in (0.0, 5e-3):
-        stroke = plan_incision(SLAB, speed=0.06, drag=drag)
+        stroke = plan_incision(SLAB, drag)
         assert asked_area(stroke, body) == pytest.approx(wanted, rel=NEAR)
 
 

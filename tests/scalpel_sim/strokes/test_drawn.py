@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.scene.strokes import StrokeTable
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.drawn import drawn_stroke
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
+from tests.support.planned_strokes import plan_stroke
 from tissue import BladeSegment, block
 
 SPEED = 0.05
@@ -17,7 +16,7 @@ NO_RESTS = [(0.0, 0.0), (0.0, 0.0)]
 
 def drawn(kind="points", **keys):
     keys = {"points": [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0)], "length": 0.05} | keys
-    return drawn_stroke(StrokeTable(kind=kind, **keys), SPEED)
+    return plan_stroke(kind, CUBE, **{"speed": SPEED} | keys)
 
 
 def tips(stroke, n=401):

@@ -8,8 +8,8 @@ import pytest
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.expected_force import expected_force, is_inside, length_inside
-from scalpel_sim.strokes.incision import DEPTH, SLOPE
-from scalpel_sim.strokes.planning import plan_stroke
+from scalpel_sim.strokes.kinds.incision import DEPTH, SLOPE
+from tests.support.planned_strokes import plan_stroke
 from tissue import BladeSegment, block, boundary_faces, liver_lobe
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))

@@ -11,23 +11,21 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.incision import (
+from scalpel_sim.strokes.kinds.incision import (
     DEPTH,
     INSERTED_AT,
     SLOPE,
     WITHDRAWN_AT,
     WITHDRAWN_LATEST,
-    plan_incision,
 )
-from scalpel_sim.strokes.planning import plan_stroke
+from tests.support.planned_strokes import plan_incision, plan_stroke
 from tissue import MATERIALS, BladeSweep, TetrahedralMesh, block, pieces_of
 
-SPEED = 0.06
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
 
 
 def tips(mesh, **settings):
-    poses = plan_incision(mesh, speed=SPEED, **settings).poses(500)
+    poses = plan_incision(mesh, **settings).poses(500)
     return np.array([pose.tip for pose in poses])
 
 
@@ -57,8 +55,7 @@ def test_the_tip_goes_in_and_out_where_it_is_asked_to(along):
 def test_an_incision_that_is_drawn_the_other_way_is_the_mirror_image():
     """The tip, the lean of the edge, the drag and where it ends at the latest; the area too."""
     here, there = (
-        plan_incision(SLAB, speed=SPEED, drag=4e-3, along=along)
-        for along in ((0.2, 0.8), (0.8, 0.2))
+        plan_incision(SLAB, drag=4e-3, along=along) for along in ((0.2, 0.8), (0.8, 0.2))
     )
     mirror = np.array([1.0, -1.0, 1.0])
     for pose, other in zip(here.poses(50), there.poses(50), strict=True):
@@ -71,11 +68,11 @@ def test_an_incision_that_is_drawn_the_other_way_is_the_mirror_image():
 
 def test_an_incision_of_no_length_is_refused():
     with pytest.raises(StrokeError, match=r"goes in at 0\.5 of the body's length"):
-        plan_incision(SLAB, speed=SPEED, along=(0.5, 0.52))
+        plan_incision(SLAB, along=(0.5, 0.52))
 
 
 def test_the_edge_slopes_with_its_heel_ahead_and_faces_forward_and_down():
-    for pose in plan_incision(SLAB, speed=SPEED).poses(5):
+    for pose in plan_incision(SLAB).poses(5):
         edge = (pose.heel - pose.tip) / np.linalg.norm(pose.heel - pose.tip)
         np.testing.assert_allclose(edge, [0.0, np.cos(SLOPE), np.sin(SLOPE)], atol=1e-12)
         np.testing.assert_allclose(pose.forward, [0.0, np.sin(SLOPE), -np.cos(SLOPE)], atol=1e-12)

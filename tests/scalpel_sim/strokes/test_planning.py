@@ -3,11 +3,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from scalpel_sim.scene.strokes import PLANNED_STROKES
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.planning import check_meets, plan_stroke
+from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.stroke import Stroke
 from tests.support import bodies
+from tests.support.planned_strokes import PLANNED, plan_stroke
 from tests.support.soundness import n_pieces
 from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe
 
@@ -84,7 +84,7 @@ def near_body(mesh, point, clearance=0.003):
     return inside.any() or np.linalg.norm(mesh.positions - point, axis=1).min() < clearance
 
 
-@pytest.mark.parametrize("name", PLANNED_STROKES)
+@pytest.mark.parametrize("name", PLANNED)
 @pytest.mark.parametrize("speed", [0.02, 0.06, 0.3])
 def test_the_blade_starts_and_ends_at_rest_and_keeps_to_its_speed(name, speed):
     stroke = plan_stroke(name, BODIES["slab"](), speed=speed)
@@ -181,11 +181,6 @@ def test_a_branched_body_is_cut_where_it_falls_into_two_parts(name):
     assert tip[0] > 0.055
 
 
-def test_an_unknown_stroke_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="Did you mean 'slanted'\\? Known: straight, slanted"):
-        plan_stroke("slant", BODIES["slab"]())
-
-
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
 def test_an_invalid_speed_is_refused(speed):
     with pytest.raises(StrokeError, match="speed of the stroke"):
@@ -193,7 +188,7 @@ def test_an_invalid_speed_is_refused(speed):
 
 
 @pytest.mark.parametrize("body", ["slab", "organ", "sheet on edge"])
-@pytest.mark.parametrize("name", PLANNED_STROKES)
+@pytest.mark.parametrize("name", PLANNED)
 def test_planned_strokes_meet_the_body(body, name):
     mesh = BODIES[body]()
     check_meets(plan_stroke(name, mesh), mesh)

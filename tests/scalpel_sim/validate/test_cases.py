@@ -59,7 +59,7 @@ def test_a_bar_is_stretched_as_its_formula_says(tmp_path, capsys):
 
 
 def test_a_blade_cuts_a_block_with_toughness_times_thickness(tmp_path, capsys):
-    words = ["validate", "--case", str(EXAMPLES / "cut.toml"), "--out", str(tmp_path), "--json"]
+    words = ["run", str(EXAMPLES / "cut.toml"), "--out", str(tmp_path), "--json"]
     assert command_line(words) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["pieces"] == 2
@@ -117,6 +117,12 @@ def test_a_case_goes_with_no_option_of_the_scenes(words, capsys):
     assert "--only and --quick are for the scenes" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", [["--young", "1e4"], ["--stroke", "press"], ["--hand", "device"]])
+def test_a_case_has_all_that_options_of_a_scene_say(words, capsys):
+    assert command_line(["run", str(EXAMPLES / "tension.toml"), *words]) == 2
+    assert f"{words[0]} is " in capsys.readouterr().err
+
+
 def test_vectors_are_interpolated_and_stay_after_the_last_time():
     table = TimeTable([1.0, 2.0], [[0.0, 0.0, 0.0], [1.0, 0.0, -2.0]], "it")
     for time, expected in ((0.0, [0, 0, 0]), (1.25, [0.25, 0, -0.5]), (9.0, [1, 0, -2])):
@@ -168,8 +174,8 @@ def test_a_value_is_that_of_the_rows_between_two_times():
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("x,y\n0,0\n1,nan\n", "line 3: '1,nan' is not two finite numbers"),
-        ("x,y\n0,0\n1\n", "line 3"),
+        ("x,y\n0,0\n1,nan\n", "line 3: 'nan' is not a finite number"),
+        ("x,y\n0,0\n1\n", "line 3: 1 values, wanted 2"),
         ("x,y\n0,1\n", "give two or more"),
         ("x,y\n1,0\n0,1\n", "must ascend"),
         ("x,y\n0,0\n1,0\n", "0 everywhere"),
@@ -183,4 +189,4 @@ def test_a_curve_that_is_none_is_refused(text, expected, tmp_path):
 def test_a_curve_that_is_missing_is_said_before_the_run(tmp_path, capsys):
     shutil.copy(EXAMPLES / "tension.toml", tmp_path)
     assert command_line(["validate", "--case", str(tmp_path / "tension.toml")]) == 2
-    assert "tension.csv cannot be read" in capsys.readouterr().err
+    assert "cannot read the curve" in capsys.readouterr().err

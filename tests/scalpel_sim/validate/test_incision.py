@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.scene.read import SCENES
-from scalpel_sim.strokes.incision import DEPTH
+from scalpel_sim.strokes.kinds.incision import DEPTH
 from scalpel_sim.validate.findings import FAIL, PASS
 from scalpel_sim.validate.incision import DrawnIncision, check_incision, check_meshes, rest_of
 from tissue import Snapshot, block

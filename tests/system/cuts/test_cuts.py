@@ -5,8 +5,8 @@ import pytest
 
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
-from scalpel_sim.strokes.planning import plan_stroke
 from tests.support import bodies, soundness, strokes
+from tests.support.planned_strokes import plan_stroke
 from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe
 
 CUBE = (0.04, 0.04, 0.04)

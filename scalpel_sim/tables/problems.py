@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, get_args, get_origin
 
 import msgspec
 
-from scalpel_sim.errors import unknown
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.tables.values import Kind
 
 REPLACED: dict[tuple[str, ...], str] = {
     ("solver", "contact"): "contact is always by forces since version 0.2, and there is none with "
@@ -61,6 +62,33 @@ def _problem(
         if problem is not None:
             return problem
     return None
+
+
+def check_keys(table: msgspec.Struct, where: str, kind_key: str, kinds: Mapping[str, Kind]) -> None:
+    """Check that the keys of a table are those of its kind. Keys of no kind belong to all.
+
+    Args:
+        table: The table; a key that is not given is None.
+        where: Its name as a file writes it.
+        kind_key: The key that says of which kind it is.
+        kinds: The keys of each kind.
+
+    Raises:
+        UsageError: one is missing, or belongs to another kind.
+    """
+    kind = getattr(table, kind_key)
+    own = kinds[kind]
+    for key in own.needed:
+        if getattr(table, key) is None:
+            raise UsageError(f'{where} of {kind_key} "{kind}" has no {key}')
+    for owner, keys in kinds.items():
+        for key in (*keys.needed, *keys.possible):
+            if key not in (*own.needed, *own.possible) and getattr(table, key) is not None:
+                keys_of_own = ", ".join((*own.needed, *own.possible)) or f"none besides {kind_key}"
+                raise UsageError(
+                    f'{where} of {kind_key} "{kind}" has the key {key}, which belongs to '
+                    f'{kind_key} "{owner}"; it has {keys_of_own}'
+                )
 
 
 def kinds_of(table: _Table) -> dict[str, Any]:

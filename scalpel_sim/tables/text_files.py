@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene.problems import problem_of
+from scalpel_sim.tables.problems import problem_of
 
 SUFFIX = ".toml"
 """What the names of such files end in."""

@@ -12,7 +12,9 @@ import math
 import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.kind import LyingBody, stroke_kind
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import timed
 from tissue import BladeSegment, FloatArray, TetrahedralMesh, boundary_faces
 
@@ -57,32 +59,27 @@ _DEGREE = 4
 it jerk."""
 
 
-def plan_incision(
-    mesh: TetrahedralMesh,
-    *,
-    speed: float,
-    depth: float | None = None,
-    drag: float = 0.0,
-    along: tuple[float, float] = (INSERTED_AT, WITHDRAWN_AT),
-) -> Stroke:
+@stroke_kind(
+    "the tip goes in from above, is drawn along the body, and is lifted out",
+    possible=("speed", "depth", "along"),
+    is_planned=True,
+)
+def incision(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return an incision along the middle of a body's longer side, seen from above.
 
-    Args:
-        mesh: The body as it lies before the stroke, tissue frame [m].
-        speed: Speed of the tip between its ramps [m/s].
-        depth: Depth of the tip below the surface [m]; None for `DEPTH`.
-        drag: How far the edge runs ahead of the material that it cuts [m]: as much farther the tip
-            is drawn, for the cut to be as long as asked.
-        along: Where the tip goes in and out, as shares of the body's length. Where the second is
-            the smaller, the blade is drawn, and leans, the other way.
+    The tip is drawn farther by as much as the edge runs ahead of the material that it cuts, for the
+    cut to be as long as planned. Where `along` ends before it begins, the blade is drawn, and
+    leans, backwards.
 
     Raises:
         StrokeError: the body's upper side has a gap there, or the tip goes in and out at one place.
     """
+    mesh, depth = body.mesh, row.depth
+    drag = DRAG_SHARE * body.material.toughness / body.material.young_modulus
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     extent = high - low
     axis = 0 if extent[0] >= extent[1] else 1
-    inserted_at, withdrawn_at = along
+    inserted_at, withdrawn_at = row.along or (INSERTED_AT, WITHDRAWN_AT)
     if abs(withdrawn_at - inserted_at) < LEAST_LENGTH:
         raise StrokeError(
             f"the incision goes in at {inserted_at:g} of the body's length, and out at "
@@ -99,14 +96,14 @@ def plan_incision(
     below[:, 1 - axis] = 0.5 * (low + high)[1 - axis]
     rise = (depth + _GAP) * up
     legs = [np.array([below[0] + rise, below[0]]), below, np.array([below[-1], below[-1] + rise])]
-    times, tips = _followed(legs, speed)
+    times, tips = _followed(legs, row.tip_speed)
     edge = math.cos(SLOPE) * ahead + math.sin(SLOPE) * up
     forward = math.sin(SLOPE) * ahead - math.cos(SLOPE) * up
     length = _REACH * depth / math.sin(SLOPE)
     poses = [BladeSegment(tip, tip + length * edge, forward) for tip in tips]
     asked_end = low[axis] + withdrawn_at * extent[axis]
     asked_until = float(np.interp(way * asked_end, way * tips[:, axis], times))
-    return Stroke(times, poses, "incision", asked=[(0.0, asked_until)])
+    return Stroke(times, poses, row.kind, asked=[(0.0, asked_until)])
 
 
 def _drawn_to(withdrawn_at: float, way: float, drag: float) -> float:

@@ -1,9 +1,8 @@
-"""The table `[[stroke]]`: how the blade is led, and the kinds of strokes that there are."""
+"""The table `[[stroke]]`: how the blade is led."""
 
-from scalpel_sim.scene.values import (
+from scalpel_sim.tables.values import (
     FileName,
     Finite,
-    Kind,
     NotNegative,
     Positive,
     RowsOfThree,
@@ -15,54 +14,6 @@ from scalpel_sim.scene.values import (
 
 DEFAULT_SPEED = 0.06
 """Speed of an unhurried incision [m/s]."""
-
-
-_OF_PATH = (
-    ("points", "length"),
-    ("edge", "forward", "slicing_ratio", "saw_amplitude", "saw_frequency", "speed"),
-)
-
-PLANNED_STROKES = {
-    "straight": Kind("a plane across the middle of the body, clean through", possible=("speed",)),
-    "slanted": Kind(
-        "a plane that leans by 25 degrees, with the blade raked by 15, clean through",
-        possible=("speed",),
-    ),
-    "curved": Kind(
-        "a bent sheet across the middle of the body, clean through", possible=("speed",)
-    ),
-    "stop": Kind("the straight stroke, ended inside the body: a slit", possible=("speed",)),
-    "incision": Kind(
-        "the tip goes in from above, is drawn along the body, and is lifted out",
-        possible=("speed", "depth", "along"),
-    ),
-    "press": Kind(
-        "the blade pushed against the body, not far enough to cut", possible=("speed", "depth")
-    ),
-}
-"""The strokes that are planned for a body."""
-
-DRAWN_STROKES = {
-    "points": Kind(
-        "the tip goes along straight lines from point to point, and rests at each corner while the "
-        "blade turns",
-        *_OF_PATH,
-    ),
-    "spline": Kind(
-        "the tip goes along a smooth curve through the points, without a stop", *_OF_PATH
-    ),
-    "stab": Kind(
-        "the tip goes in along the edge, and out again",
-        ("points", "length", "depth", "forward"),
-        ("edge", "speed"),
-    ),
-    "recorded": Kind(
-        "poses over time, from a CSV file ([command line](command_line.md))", ("file",)
-    ),
-}
-"""The strokes that a scene gives point by point."""
-
-STROKES = PLANNED_STROKES | DRAWN_STROKES
 
 
 class StrokeTable(TomlTable, kw_only=True, frozen=True):
@@ -98,6 +49,11 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     """How long the blade rests before it begins [s]."""
     pause: NotNegative = 0.0
     """How long the blade rests afterwards [s]."""
+
+    @property
+    def tip_speed(self) -> float:
+        """Speed of the tip between its ramps [m/s], the usual one where none is given."""
+        return DEFAULT_SPEED if self.speed is None else self.speed
 
 
 def stroke_called(name: str) -> StrokeTable:

@@ -1,0 +1,83 @@
+"""What a kind of stroke is: its keys, and how the path of the blade is made from them."""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.table import StrokeTable
+from scalpel_sim.tables.values import Kind
+from tissue import Material, TetrahedralMesh
+
+
+class LyingBody(NamedTuple):
+    """A body as it lies before a stroke."""
+
+    mesh: TetrahedralMesh
+    """Its mesh, tissue frame [m]."""
+    material: Material = Material()
+    """Material of the body: how far a blade displaces it, and how deep a press may go."""
+    lowest: float = -math.inf
+    """Height below which no planned stroke leads the edge [m]: the upper side of a table or a floor
+    that stops it. An incision does not come near it."""
+
+
+def no_problem(row: StrokeTable) -> None:
+    """Find nothing wrong: the keys of the row are all that counts."""
+
+
+Plan = Callable[[StrokeTable, LyingBody], Stroke]
+"""Returns the path of the blade from a row, whose keys are checked, and the body. It raises
+`StrokeError` where no blade can follow it, or the body has no section where it is planned."""
+
+
+class StrokeKind(NamedTuple):
+    """A kind of stroke."""
+
+    keys: Kind
+    """The keys that a row `[[stroke]]` of this kind needs and may have, and what it does."""
+    plan: Plan
+    """Returns the path of the blade."""
+    is_planned: bool = False
+    """Whether the program places the stroke in the body; else the row says where it is [m]."""
+    cuts: bool = True
+    """Whether the stroke is to cut; a press is not."""
+    ends_inside: bool = False
+    """Whether a stroke that cuts ends inside the body, so that its area is not known before."""
+    problem: Callable[[StrokeTable], str | None] = no_problem
+    """Returns what is wrong with a row besides its keys, as "has one point; it needs two"; None
+    where nothing is."""
+
+
+STROKES: dict[str, StrokeKind] = {}
+"""The kinds of strokes by name: those of `strokes/kinds`, and what a program adds."""
+
+
+def stroke_kind(
+    about: str, needed: tuple[str, ...] = (), possible: tuple[str, ...] = (), **settings: Any
+) -> Callable[[Plan], Plan]:
+    """Return a decorator that adds a function to `STROKES`, as the plan of the kind of its name.
+
+    Args:
+        about: What the stroke does.
+        needed: Keys that a row must have.
+        possible: Keys that a row may have besides.
+        settings: Other fields of `StrokeKind`.
+    """
+
+    def added(plan: Plan) -> Plan:
+        STROKES[plan.__name__] = StrokeKind(Kind(about, needed, possible), plan, **settings)
+        return plan
+
+    return added
+
+
+def check_positive(what: str, value: float | None, unit: str) -> None:
+    """Refuse a speed or a depth that is given and not positive.
+
+    Raises:
+        StrokeError: it is not.
+    """
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise StrokeError(f"the {what} of the stroke is {value} {unit}; it must be positive")

@@ -1,0 +1,11 @@
+"""The kinds of strokes, a module each, which adds its own to `STROKES`. A new one is found."""
+
+import pkgutil
+from importlib import import_module
+
+from scalpel_sim.strokes.kind import STROKES
+
+__all__ = ["STROKES"]
+
+for _module in pkgutil.iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")
