@@ -1,6 +1,7 @@
 """The search for a place from which a PHANTOM-like arm reaches a path, clear of what is there."""
 
 import math
+import pickle
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -91,6 +92,11 @@ class Found(NamedTuple):
     """Score of the place; not finite where the base cannot stand there."""
 
 
+_known: dict[bytes, Found] = {}
+"""What was found before, by what was to be found: a search takes up to a second, and a session
+prepares the same scene again and again."""
+
+
 def blade_path(
     stroke: Stroke, boxes: FloatArray, edge_height: float, times: FloatArray
 ) -> InstrumentPath:
@@ -128,6 +134,16 @@ def search_place(
         others: What covers them.
         at_start: Whether the arms are to be clear of each other at the first instant alone.
     """
+    asked = pickle.dumps((measures, path, tuple(others), at_start))
+    if asked not in _known:
+        _known[asked] = _search(measures, path, others, at_start=at_start)
+    return _known[asked]
+
+
+def _search(
+    measures: Geometry, path: InstrumentPath, others: Sequence[Spheres], *, at_start: bool
+) -> Found:
+    """Do `search_place`."""
     length = measures.upper + measures.forearm + measures.neck
     heights = HEIGHTS * length + measures.shoulder
     if path.table is not None:  # the base may stand on it

@@ -46,6 +46,12 @@ class View(NamedTuple):
     is_parallel: bool = False
     """Whether the projection is parallel rather than perspective."""
 
+    def sampled(self, samples: int) -> "View":
+        """Return the view with so many samples along each side of a pixel, against aliasing."""
+        return self._replace(
+            width=samples * self.width, height=samples * self.height, scale=samples * self.scale
+        )
+
     def project(self, points: FloatArray) -> FloatArray:
         """Return x and y [pixels] and nearness of points [m], shape (..., 3) each.
 
@@ -58,6 +64,13 @@ class View(NamedTuple):
         x = 0.5 * self.width + self.scale * (ahead @ self.right) * shrink
         y = 0.5 * self.height - self.scale * (ahead @ self.up) * shrink
         return np.stack([x, y, -distance if self.is_parallel else shrink], axis=-1)
+
+
+def mean_of_samples(image: FloatArray, samples: int) -> FloatArray:
+    """Return an image, shape (height, width, 3), from one of so many samples along each side."""
+    height, width, _ = image.shape
+    pixels = image.reshape(height // samples, samples, width // samples, samples, 3)
+    return np.asarray(pixels.mean(axis=(1, 3)))
 
 
 def fit_view(

@@ -48,8 +48,7 @@ def figure(
     with log_to_stderr(printing):
         check_choice("scheme", scheme, SCHEMES)
         check_file(path, ".png", "--output")
-        from scalpel_sim.figures.figures import draw_figure
-        from scalpel_sim.figures.two_moments import draw_organ, draw_two_hands
+        from scalpel_sim.figures.figures import draw_figure, draw_organ, draw_two_hands
         from scalpel_sim.runs.prepared_run import load_kernels
 
         load_kernels(printing)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scalpel_sim.figures.camera import View
+from scalpel_sim.figures.camera import View, mean_of_samples
 from scalpel_sim.figures.rasterise import draw_segments, rasterise
 from tissue import FloatArray, IntArray, Snapshot, Surface
 
@@ -30,9 +30,7 @@ def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) ->
         surface: Surface of the body, which hides the edges behind it.
         samples: Number of samples along each side of a pixel, against aliasing.
     """
-    fine = view._replace(
-        width=samples * view.width, height=samples * view.height, scale=samples * view.scale
-    )
+    fine = view.sampled(samples)
     corners = fine.project(surface.positions)[surface.triangles]
     raster = rasterise(corners, fine.width, fine.height)
     image = np.empty((fine.height, fine.width, 3))
@@ -55,9 +53,7 @@ def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) ->
         draw_segments(ends, raster.nearness, samples * _THICKNESS, _SLACK, visible, hidden)
         drawn = visible if is_surface else HIDDEN * np.maximum(visible, hidden)
         image += drawn[:, :, None] * (np.array(colour) - image)
-    fine_pixels = image.reshape(view.height, samples, view.width, samples, 3)
-    drawing: FloatArray = fine_pixels.mean(axis=(1, 3))
-    return drawing
+    return mean_of_samples(image, samples)
 
 
 def cell_edges(cells: IntArray) -> IntArray:

@@ -48,20 +48,20 @@ def _rasterise(
     height, width = triangle.shape
     for t in range(len(corners)):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
-        bx, with_scheme, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
         cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
-        twice_area = (bx - ax) * (cy - ay) - (with_scheme - ay) * (cx - ax)
+        twice_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if not abs(twice_area) > _FLAT:
             continue
         x_low = max(0, math.ceil(min(ax, min(bx, cx)) - 0.5))
         x_high = min(width - 1, math.floor(max(ax, max(bx, cx)) - 0.5))
-        y_low = max(0, math.ceil(min(ay, min(with_scheme, cy)) - 0.5))
-        y_high = min(height - 1, math.floor(max(ay, max(with_scheme, cy)) - 0.5))
+        y_low = max(0, math.ceil(min(ay, min(by, cy)) - 0.5))
+        y_high = min(height - 1, math.floor(max(ay, max(by, cy)) - 0.5))
         for row in range(y_low, y_high + 1):
             y = row + 0.5
             for column in range(x_low, x_high + 1):
                 x = column + 0.5
-                wa = ((bx - x) * (cy - y) - (with_scheme - y) * (cx - x)) / twice_area
+                wa = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / twice_area
                 wb = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / twice_area
                 wc = 1.0 - wa - wb
                 if wa < 0.0 or wb < 0.0 or wc < 0.0:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import matplotlib.image
 import numpy as np
 
-from scalpel_sim.figures.camera import View
+from scalpel_sim.figures.camera import View, mean_of_samples
 from scalpel_sim.figures.light import Lights, SurfacePoints, illuminate, make_lights
 from scalpel_sim.figures.rasterise import Raster, rasterise
 from scalpel_sim.viewer.primitives import TriangleMesh
@@ -102,9 +102,7 @@ def render(
         background: Colour in sRGB where there is no object.
         samples: Number of samples along each side of a pixel, against aliasing.
     """
-    fine = view._replace(
-        width=samples * view.width, height=samples * view.height, scale=samples * view.scale
-    )
+    fine = view.sampled(samples)
     soup = _in_front(fine, _soup(objects))
     raster = rasterise(fine.project(soup.positions), fine.width, fine.height)
     opaque = ~np.array([item.catches_shadows_only for item in objects])[soup.item]
@@ -117,8 +115,7 @@ def render(
         where = of_pixel == i
         if where.any():
             image[where] = _shade(item, fine, soup, raster, where, lights)
-    coarse = image.reshape(view.height, samples, view.width, samples, 3).mean(axis=(1, 3))
-    picture: FloatArray = coarse.clip(0.0, 1.0) ** (1.0 / GAMMA)
+    picture: FloatArray = mean_of_samples(image, samples).clip(0.0, 1.0) ** (1.0 / GAMMA)
     return picture
 
 
@@ -137,13 +134,7 @@ def _soup(objects: Sequence[SceneObject]) -> _Soup:
 def _in_front(view: View, soup: _Soup) -> _Soup:
     """Return the triangles with all corners in front of the eye; others cannot be projected."""
     ahead = ((soup.positions - view.eye) @ view.forward > 0.0).all(axis=1)
-    return _Soup(
-        soup.positions[ahead],
-        soup.normals[ahead],
-        soup.uv[ahead],
-        soup.tints[ahead],
-        soup.item[ahead],
-    )
+    return _Soup._make(column[ahead] for column in soup)
 
 
 def _shade(

@@ -1,7 +1,6 @@
 """The figures of a run: what `summary.json` holds and the table prints."""
 
 import json
-import math
 import platform
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -287,14 +286,6 @@ def versions() -> dict[str, str]:
 
 
 def summary_json(summary: Summary) -> str:
-    """Return the summary as JSON text."""
-    return json.dumps(_finite(summary._asdict()), indent=2, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    """Return a tree of JSON with null for each number that is not finite: JSON has no such."""
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    """Return the summary as JSON text, with null for each number that is not finite."""
+    numbers = json.loads(json.dumps(summary._asdict()), parse_constant=lambda _: None)
+    return json.dumps(numbers, indent=2, allow_nan=False)

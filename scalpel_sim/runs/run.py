@@ -3,20 +3,20 @@
 import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from msgspec import structs
 
-from bridge import LinkError, TcpLink
+from bridge import InProcessLink, LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.summary import COMPLETE, Summary
 from scalpel_sim.recording.growing_file import FileSum, sum_of
-from scalpel_sim.runs.file_names import INITIAL, SCENE, STROKE, grasp_file
+from scalpel_sim.runs.checkpoints import Checkpoint, CheckpointHead, Checkpoints
+from scalpel_sim.runs.file_names import FORCES, INITIAL, REPLAY_FRAMES, SCENE, STROKE, grasp_file
 from scalpel_sim.runs.journal import RunPlan
 from scalpel_sim.runs.resumption import RepeatedFrames
-from scalpel_sim.runs.run_checkpoints import RunCheckpoints
 from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
@@ -39,6 +39,68 @@ ENDED_IN_PAGE = "ended in the page"
 
 LONGEST_WAIT = 2.0
 """How long a run that is to end waits for a tissue in another process [s]."""
+
+
+class RunCheckpoints:
+    """Writes the checkpoints of a run. Where the tissue is in another process there are none.
+
+    Args:
+        outputs: Where they are written, and how often.
+        simulation: The run.
+        replay: Its replay.
+    """
+
+    def __init__(self, outputs: Outputs, simulation: Simulation, replay: ReplayWriter) -> None:
+        self._outputs, self._simulation, self._replay = outputs, simulation, replay
+        every = 0
+        if outputs.checkpoint_seconds > 0.0 and isinstance(simulation.link, InProcessLink):
+            every = max(1, round(outputs.checkpoint_seconds / simulation.dt))
+        grown = (FORCES, REPLAY_FRAMES, STROKE, *(grasp_file(g.name) for g in simulation.graspers))
+        self._checkpoints = Checkpoints(outputs.folder, every, grown)
+        if outputs.resumption is not None:
+            self._checkpoints.read(is_said=True)
+            self._checkpoints.go_on_from(outputs.resumption.n_frames)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._checkpoints.close()
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there is one from which the run could go on."""
+        return self._checkpoints.are_there
+
+    @property
+    def are_due(self) -> bool:
+        """Whether one is to be written now. All rows must be written before."""
+        return self._checkpoints.is_due(len(self._simulation.recording))
+
+    def write(self) -> None:
+        """Write a checkpoint after a frame."""
+        self._checkpoints.write(self._now)
+
+    def write_last(self) -> None:
+        """Write a checkpoint of the present, if any are wanted, and wait until all are written."""
+        if self._checkpoints.are_wanted:
+            self._checkpoints.write(self._now)
+        self._checkpoints.finish()
+
+    def mark(self) -> int:
+        """Return how many frames were done."""
+        return len(self._simulation.recording)
+
+    def cut_back(self, mark: int) -> None:
+        """Remove the checkpoints of what was undone."""
+        self._checkpoints.go_on_from(mark)
+
+    def _now(self) -> Checkpoint:
+        """Return the run as it is."""
+        simulation = self._simulation
+        n_frames, replay = len(simulation.recording), self._replay.mark()
+        head = CheckpointHead(*self._outputs.checkpoint_notes(n_frames, replay))
+        return Checkpoint(head, simulation.save_state().to_bytes())
 
 
 def perform(

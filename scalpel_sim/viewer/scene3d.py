@@ -80,8 +80,14 @@ class Readings(NamedTuple):
     """Energy balance: where the work of the blade went. None without an audit."""
 
 
-class HandState(NamedTuple):
-    """How the hand is that the page leads."""
+class HandState(
+    msgspec.Struct,
+    frozen=True,
+    tag_field="type",
+    tag="set_hand",
+    rename={"is_engaged": "engaged", "has_ended": "ended", "is_closed": "closed"},
+):
+    """How the hand is that the page leads: a command, with the names that the page reads."""
 
     tip: FloatArray
     """Where the tip of the chosen instrument is led [m], world frame, shape (3,)."""
@@ -99,8 +105,14 @@ class HandState(NamedTuple):
     """Whether the jaws of the chosen one are closed, or on their way there; None: it has none."""
 
 
-class RunState(NamedTuple):
-    """How the run is that the page controls."""
+class RunState(
+    msgspec.Struct,
+    frozen=True,
+    tag_field="type",
+    tag="set_run",
+    rename={"is_paused": "paused", "n_strokes": "strokes", "has_ended": "ended"},
+):
+    """How the run is that the page controls: a command, with the names that the page reads."""
 
     is_paused: bool
     """Whether its time stands still."""
@@ -145,7 +157,7 @@ class Scene3D:
     """Collects changes of the scene, until `take` returns them as one packet."""
 
     def __init__(self) -> None:
-        self._commands: list[dict[str, Any]] = []
+        self._commands: list[dict[str, Any] | RunState | HandState] = []
 
     def set_appearance(self, name: str, appearance: Appearance) -> None:
         """Define an appearance that meshes refer to by name."""
@@ -213,17 +225,7 @@ class Scene3D:
             cameras: One or more.
             extent: Size of the scene [m], which the lights suit.
         """
-        as_lists = [
-            {
-                "name": camera.name,
-                "eye": camera.eye.tolist(),
-                "target": camera.target.tolist(),
-                "up": camera.up.tolist(),
-                "fov": camera.fov,
-            }
-            for camera in cameras
-        ]
-        self._add("set_cameras", cameras=as_lists, extent=extent)
+        self._add("set_cameras", cameras=[each._asdict() for each in cameras], extent=extent)
 
     def set_wireframe(self, is_on: bool) -> None:
         """Switch the wireframe on or off: the edges of the tissue's triangles."""
@@ -234,8 +236,8 @@ class Scene3D:
         self._add(
             "set_readings",
             time=readings.time,
-            force=np.asarray(readings.force, float).tolist(),
-            point=np.asarray(readings.point, float).tolist(),
+            force=np.asarray(readings.force, float),
+            point=np.asarray(readings.point, float),
             cut_area=readings.cut_area,
             tetrahedra=readings.n_tetrahedra,
             newton_length=newton_length,
@@ -253,38 +255,13 @@ class Scene3D:
 
     def set_live(self, live: LiveState) -> None:
         """Show how the run is that the page controls, and its hand."""
-        self._set_run(live.run)
-        if live.hand is not None:
-            self._set_hand(live.hand)
-
-    def _set_hand(self, hand: HandState) -> None:
-        self._add(
-            "set_hand",
-            tip=hand.tip.tolist(),
-            engaged=hand.is_engaged,
-            ended=hand.has_ended,
-            stamp=hand.stamp,
-            instruments=list(hand.instruments),
-            chosen=hand.chosen,
-            closed=hand.is_closed,
-        )
-
-    def _set_run(self, run: RunState) -> None:
-        self._add(
-            "set_run",
-            paused=run.is_paused,
-            rate=run.rate,
-            real_time=run.real_time,
-            can_go_back=run.can_go_back,
-            strokes=run.n_strokes,
-            ended=run.has_ended,
-            notice=run.notice,
-        )
+        self._commands += [live.run] if live.hand is None else [live.run, live.hand]
 
     def take(self) -> bytes:
         """Return all changes since the last call as one packet; they take effect together."""
         commands, self._commands = self._commands, []
-        return msgspec.msgpack.encode({"type": "batch", "commands": commands})
+        batch = {"type": "batch", "commands": commands}
+        return msgspec.msgpack.encode(batch, enc_hook=np.ndarray.tolist)
 
     def _add(self, command: str, **fields: Any) -> None:
         self._commands.append({"type": command, **fields})

@@ -33,8 +33,7 @@ from scalpel_sim.viewer.messages import (
     StartReply,
     ViewerSettings,
 )
-from scalpel_sim.viewer.page import live_page
-from scalpel_sim.viewer.page.policy import PAGE_HEADERS, policy_of
+from scalpel_sim.viewer.page import PAGE_HEADERS, live_page, policy_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 
 LOOPBACK = "127.0.0.1"

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.scalpel_sim.output.damaged_runs import (
+from tests.scalpel_sim.output.killed_runs import (
     copied,
     damaged_at_random,
+    expect_same,
     killed_in,
     resuming,
     run_in,
 )
-from tests.scalpel_sim.output.killed_runs import expect_same
 from tests.support.battery import battery
 
 

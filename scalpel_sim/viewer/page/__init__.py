@@ -1,7 +1,10 @@
 """The web pages of the live viewer and of the replay, built around meshcat's JavaScript viewer."""
 
+import base64
+import hashlib
 import html
 import importlib.util
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from string import Template
@@ -10,7 +13,6 @@ import msgspec
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.viewer.messages import Choices
-from scalpel_sim.viewer.page.policy import policy_of
 
 _HERE = Path(__file__).parent
 """Folder of the parts of the pages."""
@@ -28,6 +30,19 @@ _CHARSET = '<meta charset="utf-8">'
 _POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
 _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
+
+
+PAGE_HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""Headers of every answer: the page is for nobody but who asked for it."""
+
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 
 
 def live_page(
@@ -96,6 +111,23 @@ def replay_page(title: str, caption: str, packets: str) -> str:
     return page.replace(_CHARSET, f"{_CHARSET}\n{_POLICY.format(policy)}", 1)
 
 
+def policy_of(document: str, connections: str) -> str:
+    """Return the Content-Security-Policy of a page.
+
+    Its scripts are those of the document, by their hashes. So a text that gets into the page, such
+    as the name of a scene, cannot become a script, and nothing is loaded or sent elsewhere.
+
+    Args:
+        document: The page. Scripts of a type of their own are data and need no permission.
+        connections: Where the page may connect to, as in `connect-src`.
+    """
+    hashes = " ".join(f"'sha256-{_hash(script)}'" for script in _SCRIPT.findall(document))
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; "
+        f"img-src data: blob:; connect-src {connections}; base-uri 'none'; form-action 'none'"
+    )
+
+
 def _page(
     title: str,
     caption: str,
@@ -126,6 +158,10 @@ def _page(
         data=data,
         scripts="\n".join(_part(script) for script in scripts),
     )
+
+
+def _hash(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def _part(name: str) -> str:

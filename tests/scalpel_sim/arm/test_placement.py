@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from scalpel_sim.arm import place_search
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
 from tests.support.planned_strokes import PLANNED, plan_stroke
@@ -100,3 +101,20 @@ def test_a_stroke_in_metres_that_is_out_of_reach_is_to_be_drawn_smaller():
 def test_an_unknown_arm_is_refused_with_the_known_ones():
     with pytest.raises(ValueError, match="Known: touch, premium, auto"):
         place(plan_stroke("straight", SLAB), bounds(SLAB), "omni")
+
+
+def test_a_place_that_was_searched_before_is_not_searched_again(monkeypatch):
+    stroke, searches, search = plan_stroke("straight", SLAB), [], place_search._search
+
+    def counted(*args, **options):
+        searches.append(args)
+        return search(*args, **options)
+
+    monkeypatch.setattr(place_search, "_known", {})
+    monkeypatch.setattr(place_search, "_search", counted)
+    first, again = (place(stroke, bounds(SLAB), "touch") for _ in range(2))
+    assert len(searches) == 1
+    place(stroke, 1.01 * bounds(SLAB), "touch")
+    assert len(searches) == 2
+    for one, other in zip(first, again, strict=True):
+        assert np.array_equal(one, other)

@@ -1,4 +1,4 @@
-"""The figures of the paper: real cuts, drawn small."""
+"""The figures: real cuts, drawn small."""
 
 import json
 
@@ -6,18 +6,30 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from scalpel_sim import SCENES
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.figures import figures
 from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
 from scalpel_sim.figures.mesh_drawing import cell_edges
+from scalpel_sim.scene.scene import changed
 
 
 @pytest.fixture
 def small(monkeypatch, tmp_path):
     """Draw small panels, in a folder of its own."""
-    monkeypatch.setattr(figures, "_WIDTH", 150)
-    monkeypatch.setattr(figures, "HEIGHT", 120)
-    monkeypatch.chdir(tmp_path)
+    draw_at(150, 120, monkeypatch, tmp_path)
+
+
+@pytest.fixture
+def wider(monkeypatch, tmp_path):
+    """Draw panels in which instruments can be seen, in a folder of its own."""
+    draw_at(240, 195, monkeypatch, tmp_path)
+
+
+def draw_at(width, height, monkeypatch, folder):
+    monkeypatch.setattr(figures, "_WIDTH", width)
+    monkeypatch.setattr(figures, "HEIGHT", height)
+    monkeypatch.chdir(folder)
 
 
 def red(image: np.ndarray) -> float:
@@ -74,3 +86,36 @@ def test_a_tetrahedron_has_six_edges_and_two_that_share_a_face_have_nine():
 def test_an_unknown_figure_or_an_invalid_output_is_refused(words, expected, small, capsys):
     assert command_line(["figure", *words]) == 2
     assert expected in capsys.readouterr().err
+
+
+def test_the_picture_of_the_readme_shows_the_organ_as_it_is_cut(wider, capsys):
+    assert command_line(["figure", "organ", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["file"] == "figureorgan.png"
+    before, after = printed["n_tetrahedra"]
+    assert 5136 < before < after
+    image = matplotlib.image.imread(printed["file"])
+    assert image.shape[:2] == (195, 2 * 240 + figures.GAP)
+    # Faces of the cut are dark red; skin has 0.4 of its red in green, shadows have all of it.
+    red = (image[:, :, 0] > 0.2) & (image[:, :, 1] < 0.25 * image[:, :, 0])
+    halves = np.array_split(red, 2, axis=1)
+    assert 0 < halves[0].sum() < halves[1].sum()  # the cut is visible, and grows
+
+
+def test_the_picture_shows_what_the_left_hand_lifts_before_and_after_it_is_cut_off(
+    wider, monkeypatch, capsys
+):
+    fast = changed(SCENES["retract"], relaxation="verlet")
+    monkeypatch.setitem(SCENES, "retract", fast)
+    assert command_line(["figure", "retract", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["file"] == "figureretract.png"
+    before, after = printed["n_tetrahedra"]
+    assert 5136 <= before < after
+    image = matplotlib.image.imread(printed["file"])
+    assert image.shape[:2] == (195, 2 * 240 + figures.GAP)
+    # Both instruments are of grey steel, and the handle of the scalpel is blue.
+    for half in np.array_split(image[:, :, :3], 2, axis=1):
+        red, green, blue = np.moveaxis(half, 2, 0)
+        grey = (np.abs(red - blue) < 0.08) & (np.abs(red - green) < 0.08) & (red < 0.9)
+        assert grey.sum() > 100 and (blue > 1.5 * red).sum() > 20

@@ -20,14 +20,18 @@ from scalpel_sim.runs.file_names import (
 )
 from scalpel_sim.runs.resumption import CHANGED_SCENE, resumption_of
 from scalpel_sim.runs.run_folder import Outputs
-from tests.scalpel_sim.output.damaged_runs import (
+from tests.scalpel_sim.output.killed_runs import (
+    Killed,
     change,
     checkpoints,
     copied,
     damaged_at_random,
+    expect_same,
     half,
     killed_in,
+    led,
     nothing,
+    physics,
     resuming,
     run_in,
     with_bits,
@@ -35,7 +39,6 @@ from tests.scalpel_sim.output.damaged_runs import (
     with_noise,
     with_rows,
 )
-from tests.scalpel_sim.output.killed_runs import Killed, expect_same, led, physics
 
 pytestmark = pytest.mark.end_to_end
 

@@ -8,8 +8,7 @@ import pytest
 from scalpel_sim import Viewer
 from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.model_shapes import body_poses
-from scalpel_sim.viewer.page import live_page
-from scalpel_sim.viewer.page.policy import policy_of
+from scalpel_sim.viewer.page import live_page, policy_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 from tests.scalpel_sim.viewer.test_replay import write_cut
