@@ -19,6 +19,7 @@ LARGEST_README = 10 * 1024
 HELPS = (
     "run",
     "view",
+    "explain",
     "serve",
     "spacemouse",
     "key",
