@@ -21,6 +21,7 @@ LARGEST_README = 10 * 1024
 HELPS = (
     "run",
     "view",
+    "explain",
     "serve",
     "spacemouse",
     "key",
