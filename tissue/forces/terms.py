@@ -185,7 +185,7 @@ def energy_of_terms(context: StepContext, edge: Edge, when: float) -> TermEnergi
 
 @kernel
 def leave_at_rest(context: StepContext) -> bool:
-    """Return whether no force on nodes would move a body that rests.
+    """Return whether no force on nodes moves a body that rests.
 
     A loose piece that touches nothing drifts on, however slowly.
     """

@@ -16,17 +16,17 @@ from tissue.forces.step_context import StepContext
 from tissue.forces.terms import leave_at_rest
 from tissue.mesh.body import Body
 
-RESTING_SPEED = 0.01
+SPEED_AT_REST = 0.01
 """Speed up to which a body is nearly at rest, the root of the mean square of its nodes weighted
 with their masses, in node sizes per second: 47 um/s in the organ. Larger: a slow motion of the body
 stops short of its end. Smaller, or the speed of the fastest node instead: a sliver of some
 milligrams that swings by micrometres after many cuts keeps the body from rest for seconds."""
 
-RESTING_FASTEST = 4.0
+FASTEST_AT_REST = 4.0
 """Speed of the fastest node up to which a body is nearly at rest, in node sizes per second: 0.02
 m/s in the organ. Larger: a sliver that snaps is stopped; smaller: as above."""
 
-RESTING_MOTION = 0.003
+MOTION_AT_REST = 0.003
 """Distance that a node may move while a body is nearly at rest, per node size: 14 um in the organ.
 Larger: what creeps stops short of its end; smaller: as above."""
 

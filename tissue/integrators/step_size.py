@@ -28,9 +28,9 @@ from tissue.integrators.node_loops import (
     run_loop,
 )
 from tissue.integrators.resting import (
-    RESTING_FASTEST,
-    RESTING_MOTION,
-    RESTING_SPEED,
+    FASTEST_AT_REST,
+    MOTION_AT_REST,
+    SPEED_AT_REST,
     TIME_TO_REST,
     have_stayed,
     keep_positions,
@@ -231,13 +231,13 @@ def note_rest(choice: StepChoice, context: StepContext) -> None:
     """Note, after an increment, whether the body was nearly at rest; stop it once it is at rest."""
     body, size = context.body, choice.node_size
     is_free = may_rest(context, choice.surroundings.drag)
-    is_slow = is_free and choice.speed <= RESTING_FASTEST * size
-    if not is_slow or mean_speed(body) > RESTING_SPEED * size:
+    is_slow = is_free and choice.speed <= FASTEST_AT_REST * size
+    if not is_slow or mean_speed(body) > SPEED_AT_REST * size:
         choice.resting = 0.0
     elif choice.resting == 0.0:
         keep_positions(body, choice.resting_positions)
         choice.resting = choice.span
-    elif have_stayed(body, choice.resting_positions, RESTING_MOTION * size):
+    elif have_stayed(body, choice.resting_positions, MOTION_AT_REST * size):
         choice.resting += choice.span
     else:
         choice.resting = 0.0
