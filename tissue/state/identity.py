@@ -68,8 +68,9 @@ class Identity(NamedTuple):
         for array in (body.rest, body.positions, body.fixed):
             digest.update(array[:nodes].tobytes())
         digest.update(body.tetrahedra[:tetrahedra].tobytes())
-        parts = {"material": material, "blade": blade, "solver": solver}
+        parts = {"blade": blade, "solver": solver}
         settings = {"gravity": repr(tuple(gravity)), "floor": repr(floor)}
+        settings |= {f"material.{key}": repr(each) for key, each in material.as_keys().items()}
         settings |= {name: value for part in parts.items() for name, value in _flat(*part)}
         for name in _FREE:
             del settings[name]
