@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tissue.blade.blade_state import BladeState
-from tissue.blade.blunt_contact import BluntContacts, blunt_side
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
 from tissue.blade.edge_anchors import (
     ANCHORED,
@@ -29,7 +28,9 @@ from tissue.blade.spine_contact import (
     PIERCING,
     PRESSING,
     TIP_END,
+    SpineContacts,
     press_of,
+    spine_side,
     tip_toughness,
     touched_point,
 )
@@ -106,9 +107,9 @@ def _forces_of_blade(stages: StepStages) -> Iterator[ActingForce]:
             limit = blade.sides.friction * float(contacts.normal_force[row])
             state = "slides" if blade.sides.states.sliding_speed[face, q] > 0.0 else "sticks"
         elif part == _BLUNT:
-            side = blade.blunt.side[index]
+            side = blade.spine.side[index]
             kind = "end" if side in (HEEL_END, TIP_END) else "back"
-            name, state, limit = _blunt_sample(blade.blunt, index, contacts, row, limit)
+            name, state, limit = _spine_sample(blade.spine, index, contacts, row, limit)
         else:
             kind, name, state = "strand", f"strand {index}", "caught by the edge"
         yield ActingForce(
@@ -136,14 +137,14 @@ def _state_of_anchor(anchors: Anchors, k: int) -> str:
     return f"{state}, at the skin" if anchors.at_skin[k] else state
 
 
-def _blunt_sample(
-    blunt: BluntContacts, k: int, contacts: RigidContacts, row: int, limit: float
+def _spine_sample(
+    spine: SpineContacts, k: int, contacts: RigidContacts, row: int, limit: float
 ) -> tuple[str, str, float]:
-    """Return name, state and limit [N] of a sample of a blunt side."""
-    name = ("back", "end at the heel", "end at the tip")[blunt.side[k]]
-    if blunt.state[k] == PIERCING:
+    """Return name, state and limit [N] of a sample of the back or an end."""
+    name = ("back", "end at the heel", "end at the tip")[spine.side[k]]
+    if spine.state[k] == PIERCING:
         return f"{name}, sample {k}", "pierces", limit
-    most = blunt.friction * float(contacts.normal_force[row])
+    most = spine.friction * float(contacts.normal_force[row])
     slides = np.linalg.norm(contacts.friction[row]) >= AT_LIMIT * most
     return f"{name}, sample {k}", "slides" if slides else "sticks", most
 
@@ -175,17 +176,17 @@ def write_sources(
     pose = pose_at(edge, 1.0)
     n = _write_edge(blade, body, pose, sources, amounts)
     n = _write_faces(blade, body, pose, n, sources, amounts)
-    blunt = blade.blunt
-    for k in range(len(blunt.state)):
-        if blunt.state[k] < PRESSING:
+    spine = blade.spine
+    for k in range(len(spine.state)):
+        if spine.state[k] < PRESSING:
             continue
-        side = blunt_side(blunt, pose, k)
-        p = touched_point(blunt, body, body.positions, k)
-        press = press_of(blunt, k, side, pose.normal, p, blade.toughness)
+        side = spine_side(spine, pose, k)
+        p = touched_point(spine, body, body.positions, k)
+        press = press_of(spine, k, side, pose.normal, p, blade.toughness)
         if press.depth > 0.0:
             sources[n, 0], sources[n, 1] = _BLUNT, k
             amounts[n, 0] = press.depth
-            amounts[n, 1] = tip_toughness(blunt, k, blade.toughness) * blunt.length[k]
+            amounts[n, 1] = tip_toughness(spine, k, blade.toughness) * spine.length[k]
             n += 1
     return n
 

@@ -16,7 +16,8 @@ from scalpel_sim.cli.resumed_run import perform_resumed
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.recording.recording import COLUMNS, read_forces
+from scalpel_sim.recording.columns import COLUMNS
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
 from scalpel_sim.runs.options import ClientOptions, PrintOptions, RunOutputOptions
