@@ -25,7 +25,7 @@ from scalpel_sim.arm.place_search import (
 )
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.strokes.kind import STROKES
+from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray
 

@@ -16,7 +16,7 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.options import Flag
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import BladeTable, MaterialTable, SolverTable
-from scalpel_sim.strokes.kind import STROKES
+from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.tables.key_texts import has_usual, texts_of, usual_text, with_note
 from scalpel_sim.tables.problems import alternatives, table_of
 

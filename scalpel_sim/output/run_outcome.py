@@ -12,7 +12,7 @@ from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import first_areas
 from scalpel_sim.strokes.asked_pieces import asked_pieces, n_large
 from scalpel_sim.strokes.expected_force import length_inside
-from scalpel_sim.strokes.kind import STROKES
+from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
     FloatArray,

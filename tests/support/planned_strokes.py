@@ -2,7 +2,7 @@
 
 import math
 
-from scalpel_sim.strokes.kind import STROKES
+from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.kinds.incision import DRAG_SHARE
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.table import StrokeTable
