@@ -92,9 +92,12 @@ class Found(NamedTuple):
     """Score of the place; not finite where the base cannot stand there."""
 
 
+MOST_KNOWN = 64
+"""Places that are kept: those of a session that varies its scenes, some kilobytes each."""
+
 _known: dict[bytes, Found] = {}
-"""What was found before, by what was to be found: a search takes up to a second, and a session
-prepares the same scene again and again."""
+"""Places that were found before, by what the arm was to reach, the oldest first: a search takes up
+to a second, and a session prepares the same scene again and again."""
 
 
 def blade_path(
@@ -134,10 +137,12 @@ def search_place(
         others: What covers them.
         at_start: Whether the arms are to be clear of each other at the first instant alone.
     """
-    asked = pickle.dumps((measures, path, tuple(others), at_start))
-    if asked not in _known:
-        _known[asked] = _search(measures, path, others, at_start=at_start)
-    return _known[asked]
+    query = pickle.dumps((measures, path, tuple(others), at_start))
+    if query not in _known:
+        while len(_known) >= MOST_KNOWN:
+            del _known[next(iter(_known))]
+        _known[query] = _search(measures, path, others, at_start=at_start)
+    return _known[query]
 
 
 def _search(

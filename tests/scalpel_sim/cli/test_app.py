@@ -27,6 +27,18 @@ WRONG_USE = {
     "an unknown command": (["rnu"], "Did you mean .run."),
     "an unknown option": (["run", "slab", "--tougness", "3"], 'Did you mean "?--toughness'),
     "a word for a number": (["run", "slab", "--young", "soft"], "soft"),
+    "a number below its range": (
+        ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
+        "--coupling-stiffness is -1.0; it must be a number above 0",
+    ),
+    "a negative number": (["run", "slab", "--skin-toughness", "-1"], "--skin-toughness is -1"),
+    "nothing where there must be some": (
+        ["run", "slab", "--toughness-speed", "0"],
+        "--toughness-speed is 0",
+    ),
+    "a whole number beyond its range": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
+    "fewer threads than one": (["run", "slab", "--threads", "0"], "--threads is 0"),
+    "an infinite time": (["run", "slab", "--seconds", "inf"], "--seconds is inf"),
     "too many words": (["run", "slab", "grid2"], "grid2"),
     "an unknown scene": (["run", "slap"], "Did you mean 'slab'.*organ"),
     "a scene and a mesh": (["run", "slab", "--mesh", "{mesh}"], "choose one"),
