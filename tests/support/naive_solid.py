@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissue import FloatArray, IntArray, TetrahedralMesh
-from tissue.laws.energy_density import EXPONENTIAL, NEO_HOOKEAN, EnergyDensity
+from tissue.laws.energy_density import EnergyDensity
 
 
 def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
@@ -39,25 +39,25 @@ def averaged_j(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
 def w(law: EnergyDensity, q: FloatArray) -> FloatArray:
     """Return the energy of a law that stiffens over mu / 2, with its straight ends."""
     positive = np.maximum(q, 0.0)
-    if law.form == EXPONENTIAL:
-        x = np.minimum(law.first * positive, 4.0)
-        return (np.expm1(x) + np.exp(x) * (law.first * q - x)) / law.first
-    return q + law.first * positive**2 + law.second * positive**3
+    if law.exponent > 0.0:
+        x = np.minimum(law.exponent * positive, 4.0)
+        return (np.expm1(x) + np.exp(x) * (law.exponent * q - x)) / law.exponent
+    return q + law.second * positive**2 + law.third * positive**3
 
 
 def slope_of_w(law: EnergyDensity, q: FloatArray) -> FloatArray:
     """Return the derivative of `w`."""
     positive = np.maximum(q, 0.0)
-    if law.form == EXPONENTIAL:
-        return np.exp(np.minimum(law.first * positive, 4.0))
-    return 1.0 + 2.0 * law.first * positive + 3.0 * law.second * positive**2
+    if law.exponent > 0.0:
+        return np.exp(np.minimum(law.exponent * positive, 4.0))
+    return 1.0 + 2.0 * law.second * positive + 3.0 * law.third * positive**2
 
 
 def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> float:
     """Return the elastic energy less that at rest [J]."""
     v, f = volumes(mesh), gradients(mesh, positions)
     squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
-    if law.form != NEO_HOOKEAN:
+    if law.exponent + law.second + law.third > 0.0:
         shear = 0.5 * law.mu * w(law, squared - 1.0 - 2.0 * j)
     else:
         shear = 0.5 * law.mu * (squared - 3.0 - np.log((squared + 1.0) / 4.0))
@@ -74,7 +74,7 @@ def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -
     cofactors = j[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
     p = law.lam_of_tetrahedra * (j - law.a)
     p = p + law.lam_of_nodes * (averaged_j(mesh, positions)[mesh.tetrahedra].mean(axis=1) - law.a)
-    if law.form != NEO_HOOKEAN:
+    if law.exponent + law.second + law.third > 0.0:
         shear = law.mu * slope_of_w(law, squared - 1.0 - 2.0 * j)
         p = p - shear
     else:

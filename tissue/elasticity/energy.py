@@ -20,7 +20,7 @@ dissipated are estimates; their sum is exact.
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, store_point
-from tissue.core.simd_blocks import alike, load_block, sum_of_lanes, width_of
+from tissue.core.simd_blocks import alike, load_block, logarithm, sum_of_lanes, width_of
 from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.collapse import collapse_energy
@@ -42,7 +42,12 @@ from tissue.elasticity.relaxed_stress import (
     rows_of_stress,
 )
 from tissue.elasticity.springs import spring_energy
-from tissue.laws.kernels import complementary_energy, shear_energy
+from tissue.laws.kernels import (
+    complementary_energy,
+    stiffens,
+    stretch_energy,
+    stretch_invariant,
+)
 from tissue.mesh.body import Body
 
 
@@ -212,7 +217,12 @@ def _energies(solid: Solid, block: int) -> Lanes:
     law, width = solid.law, width_of(solid.shape)
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
-    shear = shear_energy(law, x.x + y.y + z.z, (x, y, z), cofactors_of(x, y, z))
+    if stiffens(law):
+        shear = stretch_energy(law, stretch_invariant(x, y, z, *cofactors_of(x, y, z)))
+    else:
+        trace = x.x + y.y + z.z
+        grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
+        shear = grown - logarithm(alike(1.0, v) + alike(0.25, v) * grown)
     dilatation = load_block(solid.dilated, width * (1 + block))
     ratio = own_dilatation(solid, block, v)
     bulk = dilatation * (ratio + alike(2.0 * (1.0 - law.a), v))

@@ -1,6 +1,6 @@
 """Forces of tetrahedra under a stable neo-Hookean law, a block of tetrahedra at a time.
 
-Other laws differ in the factors of the shear alone (`tissue.laws.kernels`).
+Laws that stiffen differ in the factor of the shear alone (`tissue.laws.kernels`).
 
 With H the gradient of the displacement, F = 1 + H, K = cof F - 1 = (tr H) 1 - H^T + cof H and
 |F|^2 - 3 = 2 tr H + |H|^2, the force on node k is -V P grad N_k, where
@@ -40,7 +40,8 @@ from tissue.core.simd_rows import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
-from tissue.laws.kernels import shear_factors
+from tissue.laws.energy_density import EnergyDensity
+from tissue.laws.kernels import stiffening_factor, stiffens, stretch_invariant
 from tissue.mesh.body import Body
 
 NO_VOLUME = 1e-30
@@ -185,7 +186,7 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
         block: The block.
         has_relaxed: Whether stress has relaxed in it; a constant where this is called.
     """
-    width = width_of(solid.shape)
+    law, width = solid.law, width_of(solid.shape)
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
     p = pressure_of(solid, block, v)
@@ -193,7 +194,12 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
         p = p - relaxed_pressure(solid, block)
     trace = x.x + y.y + z.z
     cx, cy, cz = cofactors_of(x, y, z)
-    rest, s = shear_factors(solid.law, trace, (x, y, z), (cx, cy, cz))
+    if stiffens(law):
+        rest = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        s = alike(0.0, v)
+    else:
+        s = isotropic_factor(law, trace, x, y, z)
+        rest = alike(0.75 * law.mu, v)
     # The factors of H, K and 1, times -V:
     minus_v = alike(-1.0, v) * v
     a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
@@ -241,6 +247,21 @@ def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return J - 1 of the tetrahedra of a block by themselves, after `displacement_gradients`."""
     dilated = load_block(solid.dilated, width_of(solid.shape) * (1 + block))
     return dilated / (v + alike(NO_VOLUME, v))
+
+
+@inlined
+def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
+    """Return s of the neo-Hookean law [Pa].
+
+    Args:
+        law: The law.
+        trace: tr H.
+        x: First row of H.
+        y: Second row.
+        z: Third row.
+    """
+    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
+    return alike(0.25 * law.mu, trace) * grown / (grown + alike(4.0, trace))
 
 
 @inlined

@@ -33,12 +33,13 @@ from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid
 from tissue.elasticity.neo_hookean import (
     cofactors_of,
+    isotropic_factor,
     known_gradient,
     own_dilatation,
     pressure_of,
     shape_of,
 )
-from tissue.laws.kernels import shear_factors
+from tissue.laws.kernels import stiffening_factor, stiffens, stretch_invariant
 
 SMALLEST_RATIO = 0.1
 """J below which S is that of a tetrahedron of this J, with less of it: S has the factor 1 / J, and
@@ -109,11 +110,16 @@ def _elastic_stress(
 
     With K = cof F - 1, (cof F)^T cof F = 1 + K + K^T + K^T K: nothing is lost at small strain.
     """
+    law = solid.law
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
     cx, cy, cz = cofactors_of(x, y, z)
     trace = x.x + y.y + z.z
-    c, s = shear_factors(solid.law, trace, (x, y, z), (cx, cy, cz))
+    if stiffens(law):
+        c = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        s = alike(0.0, v)
+    else:
+        c, s = alike(0.75 * law.mu, v), isotropic_factor(law, trace, x, y, z)
     # The columns of K = (tr H) 1 - H^T + cof H:
     a = Vec3(trace - x.x + cx.x, cy.x - x.y, cz.x - x.z)
     b = Vec3(cx.y - y.x, trace - y.y + cy.y, cz.y - y.z)

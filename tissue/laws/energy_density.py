@@ -2,10 +2,6 @@
 
 from tissue.core.structs import Arrays
 
-NEO_HOOKEAN, EXPONENTIAL, POLYNOMIAL = 0.0, 1.0, 2.0
-"""Forms of the shear term, between which `tissue.laws.kernels` branches. A number in a struct of
-arrays that does not change is a float."""
-
 OWN_SHARE = 0.2
 """Share of the volume term beside springs that acts on each tetrahedron by itself. Where one
 tetrahedron folds while its neighbours swell, averaged volumes do not change, and springs resist
@@ -38,12 +34,12 @@ class EnergyDensity(Arrays):
     """Shear modulus at small strain [Pa]."""
     excess: float
     """What the parts of lam have more than Lame's constant, for the shear term has less [Pa]."""
-    form: float
-    """Form of the shear term."""
-    first: float
-    """First number of the form: b of the exponential, c2 of the polynomial."""
+    exponent: float
+    """b of the exponential law; 0 under another law."""
     second: float
-    """Second number of the form: c3 of the polynomial."""
+    """Ratio c2 of Yeoh's law; 0 under another law."""
+    third: float
+    """Ratio c3 of Yeoh's law; 0 under another law."""
 
 
 def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensity:
@@ -64,15 +60,13 @@ def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensit
         a=a,
         shear_modulus=mu,
         excess=5.0 / 6.0 * mu,
-        form=NEO_HOOKEAN,
-        first=0.0,
-        second=0.0,
+        **_NOT_STIFFENING,
     )
 
 
 def exponential(mu: float, lam: float, b: float) -> EnergyDensity:
     """Return the exponential law with the small-strain moduli `mu` and `lam` (Lame's) [Pa]."""
-    return _stiffening(mu, lam, EXPONENTIAL, b, 0.0)
+    return _stiffening(mu, lam, {"exponent": b, "second": 0.0, "third": 0.0})
 
 
 def polynomial(mu: float, lam: float, c2: float, c3: float = 0.0) -> EnergyDensity:
@@ -84,11 +78,11 @@ def polynomial(mu: float, lam: float, c2: float, c3: float = 0.0) -> EnergyDensi
         c2: Ratio of the second to the first coefficient, not negative.
         c3: Ratio of the third to the first coefficient, not negative.
     """
-    return _stiffening(mu, lam, POLYNOMIAL, c2, c3)
+    return _stiffening(mu, lam, {"exponent": 0.0, "second": c2, "third": c3})
 
 
-def _stiffening(mu: float, lam: float, form: float, first: float, second: float) -> EnergyDensity:
-    """Return a law that stiffens, of a form with these numbers.
+def _stiffening(mu: float, lam: float, numbers: dict[str, float]) -> EnergyDensity:
+    """Return a law of `tissue.laws.kernels` with these numbers.
 
     The part of the volume term that the shear term cancels at small strain acts on each
     tetrahedron, as the shear does.
@@ -100,9 +94,7 @@ def _stiffening(mu: float, lam: float, form: float, first: float, second: float)
         a=1.0,
         shear_modulus=mu,
         excess=mu,
-        form=form,
-        first=first,
-        second=second,
+        **numbers,
     )
 
 
@@ -121,7 +113,8 @@ def volume_term(modulus: float, *, averaged: bool = True) -> EnergyDensity:
         a=1.0,
         shear_modulus=0.0,
         excess=0.0,
-        form=NEO_HOOKEAN,
-        first=0.0,
-        second=0.0,
+        **_NOT_STIFFENING,
     )
+
+
+_NOT_STIFFENING = {"exponent": 0.0, "second": 0.0, "third": 0.0}

@@ -198,7 +198,7 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lan
     ay = Vec3(y.x + x.y - cy.x, two * y.y - trace - cy.y, y.z + z.y - cy.z)
     az = Vec3(z.x + x.z - cz.x, z.y + y.z - cz.y, two * z.z - trace - cz.z)
     squared = dot(ax, ax) + dot(ay, ay) + dot(az, az)
-    q = stretch_invariant((x, y, z), (cx, cy, cz))
+    q = stretch_invariant(x, y, z, cx, cy, cz)
     g = stiffening_factor(solid.law, q)
     slope = stiffening_slope(solid.law, q, g)
     place = width_of(solid.shape) * (1 + block)
