@@ -10,9 +10,10 @@ import pytest
 from cyclopts import App
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
-from scalpel_sim import COLUMNS, OBSERVATIONS
+from scalpel_sim import COLUMNS, OBSERVATIONS, STROKES
 from scalpel_sim.cli.app import app, command_line
 from scalpel_sim.runs.file_names import RUN_FILES
+from tissue import LAWS
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -66,7 +67,7 @@ def in_folder(tmp_path, monkeypatch):
     """Run in a folder of its own; what is added to registries is taken out again."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of processes that the code starts
-    with patch.dict(COLUMNS), patch.dict(OBSERVATIONS):
+    with patch.dict(COLUMNS), patch.dict(OBSERVATIONS), patch.dict(STROKES), patch.dict(LAWS):
         yield
 
 

@@ -10,8 +10,8 @@ from tissue.fields.node_fields import largest_principal_strains, von_mises_stres
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.faces import boundary_nodes
 from tissue.mesh.pieces import label_pieces
+from tissue.mesh.surface import boundary_nodes
 from tissue.types import Chunks, Snapshot, SurfaceQuantity
 
 

@@ -20,8 +20,8 @@ from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints, points_of
 from tissue.material import Material
 from tissue.mesh.body import Body
-from tissue.mesh.faces import boundary_surface
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
+from tissue.mesh.surface import boundary_surface
 from tissue.solver_settings import SolverSettings
 from tissue.state.identity import Identity
 from tissue.state.tissue_state import Around, TissueState

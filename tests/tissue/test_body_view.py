@@ -7,7 +7,7 @@ from tests.support import bodies, naive_solid
 from tests.support.naive_solid import around_nodes
 from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, block, fixed_nodes
 from tissue.elasticity.stiffness_matrix import edge_springs
-from tissue.mesh.faces import boundary_nodes
+from tissue.mesh.surface import boundary_nodes
 
 SINGLE, DOUBLE = 1e-4, 1e-10
 """Relative errors of forces in single and in double precision, at strains of a tenth."""

@@ -10,7 +10,7 @@ from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, add
-from tissue.geometry.rotations import nearest_rotation
+from tissue.geometry.polar_decomposition import nearest_rotation
 from tissue.geometry.tetrahedron import (
     Matrix3,
     apply,

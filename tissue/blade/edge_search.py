@@ -23,7 +23,7 @@ from tissue.blade.return_mapping import locate, set_anchor
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, nearest_on_edge
-from tissue.geometry.rotations import apply_transposed
+from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import (
     barycentric_in,
     interpolate,

@@ -5,7 +5,7 @@ from tissue.blade.edge import BladePose, sample_point
 from tissue.blade.edge_anchors import FREE, Anchors
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, sub, vec3
-from tissue.geometry.rotations import apply_transposed
+from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import (
     Matrix3,
     apply,

@@ -14,7 +14,7 @@ from tissue.blade.material_frame import find_sheets, rest_offset
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, average_directions
-from tissue.geometry.rotations import apply_transposed
+from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.mesh.body import OUTER, Body, walk
 
 OUTREACH = 6

@@ -29,9 +29,9 @@ from tissue.integrators.stability import damping_rate, stable_step
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.faces import inverted_share, lowest_altitude
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, mean_node_size, no_visits
+from tissue.mesh.surface import inverted_share, lowest_altitude
 
 INCREMENTS_TO_PIECES = 50
 """Increments of steps from a change of the mesh until loose pieces are found again: 50 ms in a

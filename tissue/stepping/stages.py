@@ -27,8 +27,8 @@ from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import write_bounds
 from tissue.mesh.changes import ChangedMesh, Owner, room_for_a_pass, touched_nodes
-from tissue.mesh.faces import path_error
 from tissue.mesh.star import Visits
+from tissue.mesh.surface import path_error
 from tissue.solver_settings import SolverSettings
 from tissue.stepping.energy_audit import Audit
 from tissue.types import Chunks, StageTimes, StepResult

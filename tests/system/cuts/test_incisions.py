@@ -83,8 +83,7 @@ class InspectedTissue(judged.WatchedTissue):
         self.n_inspected = 0
         self.found: list[str] = []
 
-    def _after_cut(self) -> None:
-        super()._after_cut()
+    def after_cut(self) -> None:
         links = self._body.links[: self.n_tetrahedra]
         state = self.n_tetrahedra + 10**6 * int((links < 0).sum())
         if state != self.inspected_state:

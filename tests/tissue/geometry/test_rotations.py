@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from tissue import are_rotations, checked_rotation
 from tissue.core.vec3 import Vec3
-from tissue.geometry.rotations import IDENTITY, apply_transposed, nearest_rotation
+from tissue.geometry.polar_decomposition import IDENTITY, apply_transposed, nearest_rotation
 from tissue.geometry.tetrahedron import Matrix3
 
 pytestmark = pytest.mark.kernel

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.materials import SPRINGS
-from tissue import Hierarchical, Material, Verlet
+from tissue import LAWS, Hierarchical, Material, Verlet
 from tissue.integrators.methods import METHODS, Global, checked_relaxation, method_of
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "integrators.md"
@@ -39,7 +39,7 @@ def test_the_table_of_the_document_has_the_numbers_of_each_method(name):
     ],
 )
 def test_a_choice_and_a_law_stand_for_one_method(choice, law, name):
-    assert method_of(choice, law) is METHODS[name]
+    assert method_of(choice, LAWS[law]()) is METHODS[name]
 
 
 @pytest.mark.parametrize(

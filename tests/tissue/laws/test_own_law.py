@@ -20,15 +20,15 @@ LINKS = 8.0
 
 @pytest.fixture
 def page() -> Iterator[dict[str, Any]]:
-    """Run the block that adds the law; return its names, and remove the law at the end."""
-    yield (names := run("A law", 0, {}))
+    """Run the block that adds the law and cuts a body; return its names, and remove the law."""
+    yield (names := run("A law", {}))
     LAWS.pop(names["ArrudaBoyce"].name)
 
 
-def run(section: str, which: int, names: dict[str, Any]) -> dict[str, Any]:
-    """Run a block of code of a section of the page with these names, and return them."""
+def run(section: str, names: dict[str, Any]) -> dict[str, Any]:
+    """Run the code of a section of the page with these names, and return them."""
     text = PAGE.read_text(encoding="utf-8").split(f"\n## {section}\n")[1].split("\n## ")[0]
-    code = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)[which]
+    code = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)[0]
     exec(compile(code, str(PAGE), "exec"), names)
     return names
 
@@ -56,8 +56,7 @@ def test_a_bar_of_a_law_of_your_own_follows_the_formula_of_its_paper(page, stret
     assert pull(narrowing)[0] == pytest.approx(expected, rel=0.01)
 
 
-def test_a_body_of_a_law_of_your_own_is_cut_in_two(page, capsys):
-    run("A law", 1, page)
+def test_a_body_of_a_law_of_your_own_is_cut_in_two(capsys, page):
     area, pieces = re.findall(r"\d+", capsys.readouterr().out.replace("mm2", ""))
     assert float(area) == pytest.approx(800.0, rel=0.1)
     assert int(pieces) == 2

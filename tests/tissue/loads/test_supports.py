@@ -193,5 +193,5 @@ def test_supports_bear_what_keeps_a_flat_tetrahedron_from_turning_over():
     begin, held = tissue.snapshot().velocities[3], tissue.support_forces().sum(axis=0)
     tissue.step(None, 1e-6)
     gained = (tissue.snapshot().velocities[3] - begin) / 1e-6
-    mass = tissue._system.body.masses[3]
+    mass = tissue._body.masses[3]
     np.testing.assert_allclose(held, mass * gained, rtol=1e-3)

@@ -6,8 +6,8 @@ import pytest
 from tests.support import bodies, soundness, strokes
 from tissue import Tissue, block
 from tissue.mesh.body import CUT, build_body
-from tissue.mesh.faces import boundary_surface
 from tissue.mesh.pieces import label_pieces
+from tissue.mesh.surface import boundary_surface
 
 CUBE = block((2, 2, 2), (0.04, 0.04, 0.04))
 
