@@ -16,7 +16,7 @@ from scalpel_sim.cli.resumed_run import perform_resumed
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.recording.columns import COLUMNS
+from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
@@ -204,7 +204,7 @@ def with_cell(row, column, text):
     def damage(data):
         lines = data.decode().splitlines(keepends=True)
         cells = lines[row].rstrip("\n").split(",")
-        cells[COLUMNS.index(column)] = text
+        cells[shared_columns().index(column)] = text
         lines[row] = ",".join(cells) + "\n"
         return "".join(lines).encode()
 
