@@ -72,7 +72,7 @@ DAMPING_SLOT_BYTES = 4 + 8
 
 
 class StageCost(NamedTuple):
-    """What one stage of the step moves and computes, as it passes over all rows."""
+    """Memory traffic and operations of one stage of the step, which passes over all rows."""
 
     slot_bytes: int
     """Bytes of each slot of a row."""
@@ -97,7 +97,7 @@ VECTORS_PER_NODE = 9
 
 
 class StepTraffic(NamedTuple):
-    """What one step must move and compute."""
+    """Least memory traffic and operations of one step."""
 
     n_springs: int
     n_slots: int

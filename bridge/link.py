@@ -56,7 +56,7 @@ class SceneView(NamedTuple):
 
 
 class TissueDescription(NamedTuple):
-    """What the arm side must know of a body in another process."""
+    """Description of a body in another process, for the side of the arm."""
 
     scene: str
     """Scene that was built, as the command line names it."""

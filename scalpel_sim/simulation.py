@@ -46,8 +46,8 @@ class Simulation:
         stroke: Where the hand leads the blade, tissue frame.
         link: The tissue.
         frame: Where the tissue lies in the world.
-        fixtures: Rigid bodies around it in the world, beside the arm's table: see `touching`.
-        tissue_every: Number of frames after which the tissue is asked again.
+        fixtures: Rigid bodies around it in the world, besides the arm's table: see `touching`.
+        tissue_every: Number of frames after which the tissue is queried again.
         coupling: Spring and damper between the arm's blade and the one that cuts; None where they
             are one.
         passivity: Whether what would give the arm energy out of nothing is damped.

@@ -17,6 +17,7 @@ from .core.memento_reading import StateError as StateError
 from .core.three_vectors import BladeSegment as BladeSegment
 from .core.three_vectors import BladeSweep as BladeSweep
 from .core.three_vectors import Wrench as Wrench
+from .cut_settings import SCHEMES as SCHEMES
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
 from .cut_settings import MeshMeasures as MeshMeasures
@@ -25,6 +26,7 @@ from .elasticity.spring_calibration import calibrated as calibrated
 from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.rotations import are_rotations as are_rotations
 from .geometry.rotations import checked_rotation as checked_rotation
+from .integrators.methods import RELAXATIONS as RELAXATIONS
 from .integrators.methods import Global as Global
 from .integrators.methods import Hierarchical as Hierarchical
 from .integrators.methods import Verlet as Verlet
@@ -55,6 +57,7 @@ from .shapes.block import block as block
 from .shapes.block import lattice_block as lattice_block
 from .shapes.cylinder import cylinder as cylinder
 from .shapes.liver_lobe import liver_lobe as liver_lobe
+from .solver_settings import PRECISIONS as PRECISIONS
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import TissueState as TissueState
 from .stepping.acting_forces import ActingForce as ActingForce
@@ -117,7 +120,10 @@ __all__ = [
     "MeshError",
     "MeshMeasures",
     "Piece",
+    "PRECISIONS",
     "Preset",
+    "RELAXATIONS",
+    "SCHEMES",
     "SKIN_COLOUR",
     "RigidContacts",
     "SchemeStatistics",

@@ -8,6 +8,9 @@ import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+SCHEMES = ("stellar", "paper")
+"""Names of the schemes: ours, and that of Bielser, Maiwald and Gross."""
+
 MOST_SNAP = 1.0
 """Largest snap: beyond a node's own size a crossing would move past its neighbours."""
 MOST_GUARD = 0.5

@@ -39,7 +39,7 @@ class DeviceState(NamedTuple):
     measured_cp: CartesianPose
     """Where the blade is: the origin is its tip, +y points from heel to tip, -z cuts."""
     measured_cf: Wrench
-    """What the tissue does to the blade, as the simulated arm feels it within its limits: force and
+    """Wrench of the tissue on the blade, as the simulated arm feels it within its limits: force and
     torque about the tip, world frame."""
     is_engaged: bool
     """Whether the device drives the blade now."""

@@ -101,7 +101,7 @@ class Channel:
 
 
 _HEADER = struct.Struct("<QHI")
-"""What a tag covers before the payload: number of messages before, kind, sequence number."""
+"""Content of a tag before the payload: number of messages before, kind, sequence number."""
 
 
 class DirectionKeys(NamedTuple):

@@ -42,7 +42,8 @@ def figure(
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.output.export import check_file
-    from scalpel_sim.scene.checks import SCHEMES, check_choice
+    from scalpel_sim.scene.checks import check_choice
+    from tissue import SCHEMES
 
     path = output or Path(f"figure{number}.png")
     with log_to_stderr(printing):

@@ -42,7 +42,7 @@ class WallTimes(NamedTuple):
 
 
 class HeldLoad(Protocol):
-    """What the tissue does to an attachment."""
+    """Load of the tissue on an attachment."""
 
     @property
     def wrench(self) -> Wrench:

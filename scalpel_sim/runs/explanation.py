@@ -1,4 +1,4 @@
-"""What acted in one frame of a run: it is done again there, from its folder, which stays as it is.
+"""Explanation of one frame of a run: it is done again there, from its folder, which stays as it is.
 
 A run is put to the last checkpoint before the frame, or to its start, and the frames until there
 are repeated. They give the same bits, which is checked against `forces.csv`.
@@ -61,7 +61,7 @@ class ToExplain(NamedTuple):
 
 
 class Explanation(NamedTuple):
-    """What acted in one frame. World frame, as in `forces.csv`."""
+    """Forces that acted in one frame. World frame, as in `forces.csv`."""
 
     folder: Path
     scene: str

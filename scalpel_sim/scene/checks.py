@@ -1,4 +1,4 @@
-"""What makes no sense together in a scene: each check stands here, once."""
+"""Checks of keys of a scene that make no sense together: each stands here, once."""
 
 import math
 import os
@@ -18,16 +18,7 @@ from scalpel_sim.scene.schema import (
     WaypointTable,
     WorldTable,
 )
-from tissue import Material
-
-SCHEMES = ("stellar", "paper")
-"""Names of the schemes that `Tissue` takes."""
-
-RELAXATIONS = ("global", "verlet", "hierarchical")
-"""Names of the relaxations that `Tissue` takes."""
-
-_PRECISIONS = ("single", "double")
-"""Precisions that `Tissue` takes."""
+from tissue import PRECISIONS, RELAXATIONS, SCHEMES, Material
 
 COUPLINGS = ("rigid", "virtual")
 """Names of the couplings between the arm's blade and the one that cuts."""
@@ -77,8 +68,8 @@ def check_solver(solver: SolverTable, material: Material) -> None:
     """
     relaxation, threads = solver.relaxation, solver.threads
     check_choice("scheme", solver.scheme, SCHEMES)
-    check_choice("relaxation", relaxation, RELAXATIONS)
-    check_choice("precision", solver.precision, _PRECISIONS)
+    check_choice("relaxation", relaxation, tuple(RELAXATIONS))
+    check_choice("precision", solver.precision, PRECISIONS)
     if threads != 1 and relaxation == "hierarchical":
         raise UsageError(
             f"--threads {threads} is for --relaxation global or verlet; {relaxation} runs on one"

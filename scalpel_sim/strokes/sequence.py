@@ -16,9 +16,6 @@ _SPEED = 0.1
 _CLEARANCE = 5e-3
 """How far from the body the blade stays on its way [m]: tissue that was cut may stand out."""
 
-_POSES_A_METRE = 1000.0
-"""Poses on the way, for each metre: between them the blade turns evenly."""
-
 _ROUNDING = 1e-6
 """Share by which a blade may be shorter than a stroke needs: rounding of a file's digits."""
 

@@ -1,4 +1,4 @@
-"""What the tables of TOML files are made of.
+"""Parts of the tables of TOML files.
 
 values      what a key may hold
 problems    what is wrong with a file, and where; which keys a kind of table has

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple, NoReturn, Protocol
 
-from tissue.cut_settings import CutSettings
+from tissue.cut_settings import SCHEMES, CutSettings
 from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.stellar_scheme import StellarScheme
 from tissue.cutting.workspace import SnapLimits
@@ -27,9 +27,6 @@ RESTING_SPEED = 0.2
 RESTING_TIME = 0.02
 """Time at rest before the cut opens up to the edge [s]. A trembling hand stands still for an
 instant at each turn; to lay a crack front there each time would shred the mesh."""
-
-_SCHEMES = ("stellar", "paper")
-"""Names of the schemes: ours, and that of Bielser, Maiwald and Gross."""
 
 
 class NoRoomError(Exception):
@@ -277,8 +274,8 @@ def checked_scheme(name: str) -> str:
     Raises:
         ValueError: there is no such scheme.
     """
-    if name not in _SCHEMES:
-        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(_SCHEMES)}")
+    if name not in SCHEMES:
+        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(SCHEMES)}")
     return name
 
 

@@ -89,13 +89,6 @@ def potential_energy(body: Body, gravity: Vec3) -> float:
 
 
 @kernel
-def body_energy(body: Body, elastic: Elastic, gravity: Vec3) -> float:
-    """Return the sum of elastic, kinetic and potential energy [J]."""
-    stored = elastic_energy(elastic, body) + kinetic_energy(body)
-    return stored + potential_energy(body, gravity)
-
-
-@kernel
 def dissipated_power(
     body: Body,
     elastic: Elastic,

@@ -230,15 +230,6 @@ def spring_energy(springs: Springs, body: Body) -> float:
     return energy
 
 
-@kernel
-def total_volume(body: Body) -> float:
-    """Return the volume of the body at rest [m3]."""
-    volume = 0.0
-    for t in range(body.n_tetrahedra):
-        volume += tetrahedron_volume(body.rest, body.tetrahedra, t)
-    return volume
-
-
 @inlined
 def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
     """Return the pull of the springs on a node [N]: the sum of k (l - l0) along each."""

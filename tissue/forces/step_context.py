@@ -1,4 +1,4 @@
-"""What a step works on: one struct for kernels, and the part of a time step to advance by."""
+"""Everything that a step works on: one struct for kernels, and a part of a time step."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What an integrator does for a tissue, and the error where the motion becomes unstable."""
+"""Protocol of an integrator of a tissue, and the error where the motion becomes unstable."""
 
 from typing import Protocol
 

@@ -170,12 +170,12 @@ class Hierarchical:
 
 IntegratorOptions = Global | Verlet | Hierarchical
 
-BY_NAME: dict[str, IntegratorOptions] = {
+RELAXATIONS: dict[str, IntegratorOptions] = {
     "global": Global(),
     "verlet": Verlet(),
     "hierarchical": Hierarchical(),
 }
-"""Integrators by name, with their default settings."""
+"""Names of relaxations, with the integrators that they stand for in their default settings."""
 
 
 def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> IntegratorOptions:
@@ -185,12 +185,12 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
         ValueError: there is no such integrator, or it is not for that material.
     """
     if isinstance(choice, str):
-        if choice not in BY_NAME:
-            raise ValueError(f"no relaxation is called {choice!r}. Known: {', '.join(BY_NAME)}")
-        choice = BY_NAME[choice]
+        if choice not in RELAXATIONS:
+            raise ValueError(f"no relaxation is called {choice!r}. Known: {', '.join(RELAXATIONS)}")
+        choice = RELAXATIONS[choice]
     if not isinstance(choice, IntegratorOptions):
         raise ValueError(
-            f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Global, "
+            f"relaxation is {choice!r}; it must be a name ({', '.join(RELAXATIONS)}), or Global, "
             "Verlet or Hierarchical with settings"
         )
     has_tetrahedra = not material.law.has_springs or material.volume_modulus > 0.0

@@ -70,8 +70,6 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMe
     mesh = checked(TetrahedralMesh(mesh.positions * scale, mesh.tetrahedra), str(path)).mesh
     if len(mesh.tetrahedra) < RENUMBER_FROM:
         return mesh
-    pass  # LOOK
-
     return renumbered(mesh)[0]
 
 

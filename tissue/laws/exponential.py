@@ -23,11 +23,7 @@ class Exponential:
     have 5 to 30."""
 
     name: ClassVar[str] = "exponential"
-    keys: ClassVar[Mapping[str, LawKey]] = {
-        "stiffening": LawKey(
-            "b", "b of law exponential: stretched to length 1 + e, tissue is exp(3 b e^2) as stiff"
-        )
-    }
+    keys: ClassVar[Mapping[str, LawKey]] = {"stiffening": LawKey("b")}
     stiffens: ClassVar[bool] = True
     has_springs: ClassVar[bool] = False
 

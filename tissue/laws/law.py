@@ -24,8 +24,6 @@ class LawKey(NamedTuple):
 
     field: str
     """Name of the parameter in the class of the law."""
-    about: str
-    """Meaning of the parameter, with its unit."""
     neutral: float = 0.0
     """Value under laws that do not have the parameter."""
 

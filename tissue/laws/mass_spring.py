@@ -19,16 +19,12 @@ class MassSpring:
     """
 
     calibration: float = 1.0
-    """Stiffness of the springs over that of van Gelder's formula."""
+    """Stiffness of the springs over that of van Gelder's formula: 1, unless the mesh was calibrated
+    (`tissue.calibrated`)."""
 
     name: ClassVar[str] = "springs"
     keys: ClassVar[Mapping[str, LawKey]] = {
-        "spring_calibration": LawKey(
-            "calibration",
-            "Stiffness of the springs over that of van Gelder's formula. 1 unless the mesh was "
-            "calibrated by tissue.calibrated",
-            neutral=1.0,
-        )
+        "spring_calibration": LawKey("calibration", neutral=1.0)
     }
     stiffens: ClassVar[bool] = False
     has_springs: ClassVar[bool] = True

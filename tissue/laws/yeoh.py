@@ -25,8 +25,8 @@ class Yeoh:
 
     name: ClassVar[str] = "yeoh"
     keys: ClassVar[Mapping[str, LawKey]] = {
-        "yeoh_second": LawKey("c2", "C20 / C10 of law yeoh"),
-        "yeoh_third": LawKey("c3", "C30 / C10 of law yeoh"),
+        "yeoh_second": LawKey("c2"),
+        "yeoh_third": LawKey("c3"),
     }
     stiffens: ClassVar[bool] = True
     has_springs: ClassVar[bool] = False

@@ -149,7 +149,7 @@ class StepWatch:
 
 
 class StepBounds(Arrays):
-    """What a step of a body is judged by."""
+    """Quantities by which a step of a body is judged."""
 
     before: FloatArray
     """What `write_look` wrote before the step, shape (`LOOK_NUMBERS`,)."""

@@ -164,7 +164,7 @@ class StepStages:
         n = self.integrator.relax(model, self._blade_context, increment, has_blade)
         if is_driven:
             audit.work_of_loads += handles.end_increment(before, increment)
-        audit.lost_at_geoms += model.geoms.arrays.dissipated
+            audit.lost_at_geoms += model.geoms.arrays.dissipated
         if n > 0:
             audit.forget()
         model.interaction.edge_now = (increment.edge, increment.end)

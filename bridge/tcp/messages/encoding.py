@@ -68,7 +68,7 @@ class Part(Protocol):
     """A part of a content, between a value and what MessagePack has."""
 
     type: Any
-    """What MessagePack has, as `msgspec` checks it."""
+    """Types that MessagePack has, as `msgspec` checks them."""
 
     def plain(self, value: Any) -> Any:
         """Return what MessagePack has for a value."""
@@ -184,7 +184,7 @@ class Record:
 
 
 class _Plain:
-    """What MessagePack has itself."""
+    """Value of a type that MessagePack has itself."""
 
     def __init__(self, kind: Any) -> None:
         self.type = kind

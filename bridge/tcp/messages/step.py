@@ -60,7 +60,7 @@ class _Step(NamedTuple):
 
 
 class StepReply(NamedTuple):
-    """What a step did."""
+    """Answer of the tissue to a step."""
 
     result: StepResult
     """Result of the step. Physical quantities are passed on unchanged, NaN included."""

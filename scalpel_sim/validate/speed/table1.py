@@ -16,7 +16,6 @@ from scalpel_sim.planned_cut import PlannedCut, prepare_cut
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.scene.body import GivenBody
-from scalpel_sim.scene.checks import SCHEMES
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.validate.speed.measurements import (
@@ -36,7 +35,7 @@ from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings
 from scalpel_sim.viewer.scene_packets import ScenePackets
-from tissue import FloatArray, block
+from tissue import SCHEMES, FloatArray, block
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -7,11 +7,11 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.summary import TABLE_1
-from scalpel_sim.scene.checks import SCHEMES
 from scalpel_sim.validate.speed.command import IN_CLONE
 from scalpel_sim.validate.speed.measurements import HIGHER, LOWER, NEITHER, load_results
 from scalpel_sim.validate.speed.scenes import measure_scenes
 from tests.support.measured import is_sane, printed
+from tissue import SCHEMES
 
 
 def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
