@@ -31,12 +31,12 @@ SHORT_LARGEST = 20_250
 """Largest body of the short set [tetrahedra]."""
 
 
-def short(runs: Rounds = 5, watch: TurnWatch = SILENT) -> list[BenchmarkResult]:
+def short(*, runs: Rounds = 5, watch: TurnWatch = SILENT) -> list[BenchmarkResult]:
     """Run a short set: the kernels in small bodies, one scene, and the limits of the machine."""
     return [
-        kernels(runs, watch, largest=SHORT_LARGEST),
+        kernels(runs=runs, watch=watch, largest=SHORT_LARGEST),
         measure_scenes(runs, ["slab"], watch),
-        roofline(runs, watch, largest=SHORT_LARGEST),
+        roofline(runs=runs, watch=watch, largest=SHORT_LARGEST),
     ]
 
 

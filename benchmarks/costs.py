@@ -192,7 +192,7 @@ def undo(scene: str = "organ", /, *, times: int = 10) -> BenchmarkResult:
 
 
 def long_run(
-    watch: TurnWatch = SILENT, *, scene: str = "grid2", seconds: float = 60.0
+    *, watch: TurnWatch = SILENT, scene: str = "grid2", seconds: float = 60.0
 ) -> BenchmarkResult:
     """Measure memory and frames of a long run that is written, with checkpoints and without.
 

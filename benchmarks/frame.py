@@ -218,7 +218,7 @@ class Stopwatches:
 
 
 def fixed_cost(
-    watch: TurnWatch = SILENT, *, frames: int = 2000, audit: Flag = False
+    *, watch: TurnWatch = SILENT, frames: int = 2000, audit: Flag = False
 ) -> BenchmarkResult:
     """Time a frame of 48 tetrahedra, whole and part by part: what every frame costs.
 

@@ -29,7 +29,7 @@ _ABOUT = (
 
 
 def kernels(
-    runs: Rounds = 5, watch: TurnWatch = SILENT, *, largest: Largest = None
+    *, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None
 ) -> BenchmarkResult:
     """Time forces, steps, a cut step and contact detection in 576 to 60,000 tetrahedra."""
     sizes = sizes_up_to(_SIZES, largest)
@@ -57,7 +57,7 @@ def kernels(
         quantities.append(Quantity("kernels", name, 2 * touching_size, "time", "µs", CPU.name))
     taken = time_in_turns(cases, runs, clock=CPU, watch=watch)
     measured = [_summary(each, rounds) for each, rounds in zip(quantities, taken, strict=True)]
-    measured += cut(runs, watch, largest=SMALLEST_CUT).measurements
+    measured += cut(runs=runs, watch=watch, largest=SMALLEST_CUT).measurements
     return as_rows("kernels", measured, about=_ABOUT)
 
 

@@ -70,7 +70,7 @@ _ABOUT_TCP = (
 )
 
 
-def round_trip(watch: TurnWatch = SILENT, *, steps: int = 4000) -> BenchmarkResult:
+def round_trip(*, watch: TurnWatch = SILENT, steps: int = 4000) -> BenchmarkResult:
     """Time a step over TCP, with a key and without, and the same step in process.
 
     Args:

@@ -91,9 +91,9 @@ class Frames(NamedTuple):
 
 
 def real_time(
+    *,
     runs: Rounds = 5,
     watch: TurnWatch = SILENT,
-    *,
     scenes: Names = (),
     materials: Names = (),
     strokes: Annotated[Sequence[int], Parameter(consume_multiple=True)] = (),

@@ -199,7 +199,7 @@ def roofline_bound(
 
 
 def roofline(
-    runs: Rounds = 5, watch: TurnWatch = SILENT, *, largest: Largest = None
+    *, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None
 ) -> BenchmarkResult:
     """Measure bandwidth and arithmetic of this machine, and the share of them that a step uses."""
     sizes = sizes_up_to((_SMALLEST, *_SIZES), largest)

@@ -144,14 +144,14 @@ class SlitFrames(NamedTuple):
 
 
 def scaling(
-    runs: Rounds = 5, watch: TurnWatch = SILENT, *, largest: Largest = None
+    *, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None
 ) -> list[BenchmarkResult]:
     """Time a step, and a local frame, in bodies of 576 to 1,000,000 tetrahedra."""
     sizes, local_sizes = (sizes_up_to(each, largest) for each in (_SIZES, _LOCAL_SIZES))
     return [measure_steps(runs, sizes, watch), measure_local_frames(runs, local_sizes, watch)]
 
 
-def cut(runs: Rounds = 5, watch: TurnWatch = SILENT, *, largest: Largest = None) -> BenchmarkResult:
+def cut(*, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None) -> BenchmarkResult:
     """Time a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
     sizes = sizes_up_to(tuple(_CUT_BLOCKS), largest)
     cut_block(sizes[0])  # loads the kernels and wakes the processor

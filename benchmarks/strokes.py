@@ -81,8 +81,8 @@ class DoneStroke(NamedTuple):
 
 
 def random_strokes(
-    watch: TurnWatch = SILENT,
     *,
+    watch: TurnWatch = SILENT,
     strokes: int = 50,
     seed: int = 0,
     relaxation: Literal["global", "verlet", "hierarchical"] | None = None,

@@ -23,7 +23,7 @@ SETS = (
     KernelSet(is_held=True),
 )
 """Kernels of most tests of bodies and runs. What one file alone calls, it compiles."""
-N_KERNELS = 1200
+N_KERNELS = 1340
 """How many kernels these sets have, about."""
 
 

@@ -194,9 +194,9 @@ class PeerRun(NamedTuple):
 
 
 def peers(
+    *,
     runs: Rounds = 5,
     watch: TurnWatch = SILENT,
-    *,
     largest: Largest = None,
     python: Path | None = None,
     sizes: Annotated[Sequence[int], Parameter(parse=False)] = _SIZES,

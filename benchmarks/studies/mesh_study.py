@@ -51,8 +51,8 @@ TORSION_CONSTANT = 0.140577
 
 
 def mesh_study(
-    watch: TurnWatch = SILENT,
     *,
+    watch: TurnWatch = SILENT,
     finest: Literal[2, 4, 6, 8] = 8,
     out: Path = Path("docs"),
 ) -> BenchmarkResult:

@@ -83,8 +83,8 @@ class Variation(NamedTuple):
 
 
 def thin_walls(
-    watch: TurnWatch = SILENT,
     *,
+    watch: TurnWatch = SILENT,
     variations: int = 40,
     first: int = 0,
     seed: int = 0,

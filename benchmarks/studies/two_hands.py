@@ -36,9 +36,9 @@ Settings = Annotated[tuple[str, ...], Parameter(name="--set", negative="")]
 def two_hands(
     scene: Literal["retract", "excise", "taut_incision"],
     /,
+    *,
     runs: Rounds = 20,
     watch: TurnWatch = SILENT,
-    *,
     seed: int = 0,
     settings: Settings = (),
 ) -> BenchmarkResult:

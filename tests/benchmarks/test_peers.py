@@ -71,7 +71,7 @@ def test_ratios_are_taken_in_each_round_and_missing_cases_are_reported(capsys, m
     chosen = {theirs: PEERS[theirs], "MuJoCo flex, made up": PEERS[theirs]._replace(
         case="none:damped")}  # fmt: skip
     monkeypatch.setattr(peer_benchmark, "PEERS", chosen)
-    found = peers(2, sizes=(576,))
+    found = peers(runs=2, sizes=(576,))
     by_case = {(each.case, each.quantity): each for each in found.measurements}
     ratio = by_case[theirs, f"times as long as {ours}"]
     assert ratio.n == 2 and ratio.lowest <= ratio.median <= ratio.highest
@@ -91,7 +91,7 @@ def test_an_engine_that_is_not_installed_is_named_with_what_installs_it(monkeypa
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(peer_benchmark, "OURS", {})
     monkeypatch.setattr(peer_benchmark, "PEERS", {name: PEERS[name]})
-    found = peers(1, sizes=(576,))
+    found = peers(runs=1, sizes=(576,))
     assert found.measurements == []
     (skipped,) = found.skipped
     assert skipped.reason.startswith("Newton is not installed here: pip install newton")

@@ -41,7 +41,7 @@ def test_growing_keeps_every_row_of_the_list_in_use(first):
 @pytest.mark.parametrize("when", [0.0, 0.3, 1.0])
 def test_a_geom_turns_about_an_even_axis_and_its_origin_moves_on_a_line(when):
     random = np.random.default_rng(0)
-    start, turn = Rotation.random(rng=random), Rotation.from_rotvec([0.3, -0.9, 0.5])
+    start, turn = Rotation.from_quat(random.normal(size=4)), Rotation.from_rotvec([0.3, -0.9, 0.5])
     geoms = new_geoms([Geom("box", "box", (0.01, 0.02, 0.03))])
     geoms.origin_t0[0], geoms.axes_t0[0] = (1.0, 2.0, 3.0), start.as_matrix().ravel()
     there = np.array([[1.1, 2.0, 2.8]])
