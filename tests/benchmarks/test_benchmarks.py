@@ -31,7 +31,7 @@ def test_a_cut_does_the_same_work_in_a_body_of_any_size():
 
 
 def test_every_step_of_a_cut_is_a_sample():
-    found = cut(2, largest=SMALLEST_CUT)
+    found = cut(runs=2, largest=SMALLEST_CUT)
     assert all(map(is_sane, found.measurements))
     by_case = {each.case: each for each in found.measurements}
     assert by_case["cut step"].n == by_case["split tetrahedron"].n > 10
@@ -40,7 +40,7 @@ def test_every_step_of_a_cut_is_a_sample():
 
 
 def test_each_loop_is_timed_for_each_law_and_size_and_contact_between_two_blocks(capsys):
-    found = kernels(1, largest=5_400)
+    found = kernels(runs=1, largest=5_400)
     assert all(map(is_sane, found.measurements))
     cases = {(each.case, each.tetrahedra) for each in found.measurements}
     loops = ("forces", "Runge-Kutta step", "time step of 1 ms")
@@ -78,7 +78,7 @@ def test_a_local_frame_splits_a_dozen_in_a_body_of_any_size(capsys):
 
 
 def test_a_roofline_reports_the_limits_the_needs_of_a_step_and_its_share(capsys):
-    found = roofline(1, largest=576)
+    found = roofline(runs=1, largest=576)
     assert all(map(is_sane, found.measurements))
     by_case = {each.case: each for each in found.measurements}
     shares = [share for case, share in by_case.items() if case.startswith("share")]
