@@ -252,7 +252,7 @@ class TouchingBlocks:
 
         The searches of `searches` are part of it.
         """
-        search = self._contact._search
+        search = self._contact.search
         for _ in range(n):
             search.pairs.n_updates += 1  # all nodes count as new
             search.is_pairing_due = 1

@@ -100,12 +100,15 @@ class Bridge:
         self._arm: Pose | None = None
         self._queried_at: Pose | None = None
         self._path: list[PathPart] = []
-        self._result: StepResult | None = None
+        self.result: StepResult | None = None
+        """The tissue's last answer, in the tissue frame; None before the first one."""
         self._raw: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._felt = frame.wrench_to_world(Wrench(np.zeros(3), np.zeros(3), np.zeros(3)))
         self._raw_is_felt = True
-        self._touching: tuple[str, ...] = ()
-        self._answered = False
+        self.touching: tuple[str, ...] = ()
+        """Names of the fixtures that the blade's swept box touched at the last query."""
+        self.answered = False
+        """Whether the tissue answered in the last step, so that `result` is new."""
         self._is_anchored_as_before = False
         self._silence = 0.0
         self._n_frames = 0
@@ -145,7 +148,7 @@ class Bridge:
             raw = self._advance(arm, dt)
         else:
             raw = self._consult(arm, dt)
-        work = 0.0 if self._result is None else self._result.work_of_blade
+        work = 0.0 if self.result is None else self.result.work_of_blade
         travel = Travel(arm_motion, 0.5 * arm.length, work)
         self._raw, self._raw_is_felt = raw, False
         felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
@@ -274,26 +277,11 @@ class Bridge:
         return self._frame
 
     @property
-    def result(self) -> StepResult | None:
-        """The tissue's last answer, in the tissue frame; None before the first one."""
-        return self._result
-
-    @property
-    def answered(self) -> bool:
-        """Whether the tissue answered in the last step, so that `result` is new."""
-        return self._answered
-
-    @property
     def wrench_raw(self) -> Wrench:
         """The tissue's last wrench before any limit, in the world."""
         if self._raw_is_felt or self._arm is None:
             return self._felt
         return self._frame.numbers_to_world(self._raw, self._arm.tip)
-
-    @property
-    def touching(self) -> tuple[str, ...]:
-        """Names of the fixtures that the blade's swept box touched at the last query."""
-        return self._touching
 
     @property
     def counters(self) -> Counters:
@@ -307,7 +295,7 @@ class Bridge:
         driven = self._driven.poses
         # It stays where a link fails: the next frame then does both.
         self._path.append(PathPart(arm, dt, driven))
-        touches, self._touching = self._broad_phase.overlaps(
+        touches, self.touching = self._broad_phase.overlaps(
             before, arm, dt, engaged=self._engaged()
         )
         self._n_rejected += not touches
@@ -317,7 +305,7 @@ class Bridge:
         self._driven.take(loads_over(self._link), result)
         self._path.clear()
         self._take(result, dt)
-        self._answered = True
+        self.answered = True
         return _about_tip(result)
 
     def _consult(self, arm: Pose, dt: float) -> Six:
@@ -331,7 +319,7 @@ class Bridge:
         answer = query.take_answer()
         if answer is not None:
             self._process(answer)
-        self._answered = answer is not None
+        self.answered = answer is not None
         self._silence = self._silence + dt if query.is_pending else 0.0
         raw = self._wrench_on(arm, dt) if balanced is None else balanced
         if not self._is_direct:
@@ -344,7 +332,7 @@ class Bridge:
         overlaps = functools.partial(self._broad_phase.overlaps, engaged=self._engaged())
         straight = self._is_anchored_as_before and len(self._path) > 2
         found = sweeps_along(self._path, self._queried_at or blade, overlaps, straight=straight)
-        self._touching = found.fixtures
+        self.touching = found.fixtures
         self._n_rejected += not found.touches
         self._query.start(found.parts, blade.segment)
         if not self._is_direct:
@@ -369,20 +357,20 @@ class Bridge:
         if not math.isfinite(sum(low) + sum(high)):
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
         self._broad_phase.update_bounds((low, high), seconds)
-        before = 0.0 if self._result is None else self._result.anchored_length
+        before = 0.0 if self.result is None else self.result.anchored_length
         self._is_anchored_as_before = 0.0 < result.anchored_length == before
-        self._result = result
+        self.result = result
         self._n_answers += 1
 
     def _wrench_on(self, arm: Pose, dt: float) -> Six:
         """Return the tissue's wrench on a blade without a proxy, about its tip."""
-        if self._is_direct and self._result is not None:
-            return _about_tip(self._result)
+        if self._is_direct and self.result is not None:
+            return _about_tip(self.result)
         return self._prediction.wrench_on(arm.segment, dt)
 
     def _engaged(self) -> bool:
         """Return whether the blade holds tissue, which it may drag out of any box."""
-        result = self._result
+        result = self.result
         return result is not None and (result.anchored_length > 0.0 or result.n_active > 0)
 
 

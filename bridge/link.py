@@ -216,12 +216,14 @@ class InProcessLink:
     ) -> StepResult:
         """Advance the tissue by `dt` [s]; see `TissueLink.step`."""
         driven = self._frames[self._n_own :]
-        expect_each(poses, len(driven))
-        expect_pose_of_each(geoms, self._n_geoms)
-        if self._geoms is not None:
-            self._geoms.move(geoms)
-        for frame, pose in zip(driven, poses, strict=True):
-            frame.move(pose.origin, pose.rotation)
+        if poses or driven:
+            expect_each(poses, len(driven))
+            for frame, pose in zip(driven, poses, strict=True):
+                frame.move(pose.origin, pose.rotation)
+        if geoms is not NO_GEOMS or self._geoms is not None:
+            expect_pose_of_each(geoms, self._n_geoms)
+            if self._geoms is not None:
+                self._geoms.move(geoms)
         return self._tissue.step(sweep, dt)
 
     def attach(self, attachment: FrameAttachment) -> int:

@@ -115,7 +115,8 @@ class Simulation:
 
     def _take_columns(self) -> None:
         """Begin the recording, with the columns of all instruments."""
-        self._groups = [*self._shared, *(each.columns for each in self.instruments)]
+        groups = (*self._shared, *(each.columns for each in self.instruments))
+        self._groups = [group for group in groups if group.quantities]
         self.recording = Recording(columns_of(self._groups))
         """Rows of the frames so far."""
 
@@ -202,7 +203,9 @@ class Simulation:
         drawn = time.perf_counter()
         self.n_frames += 1
         if self.records:
-            stages = self.result.stage_times if self.bridge.answered else _NO_STEP
+            result, stages = self.bridge.result, _NO_STEP
+            if result is not None and self.bridge.answered:
+                stages = result.stage_times
             self._wall_times = WallTimes(*stages, drawn - done, done - start)
             self._record(drawn)
         self.wall_seconds += time.perf_counter() - start

@@ -177,6 +177,11 @@ class StepResult(NamedTuple):
     energies: Energies | None
     """Energy balance since the body was made; None without an audit."""
 
+    @property
+    def contacts_of_blade(self) -> RigidContacts:
+        """Where the blade acts on the tissue: without contacts of geoms, which take time."""
+        return self.contacts.of_blade
+
 
 class TetrahedralMesh(NamedTuple):
     """A tetrahedral mesh, from a file or a generator."""

@@ -106,7 +106,7 @@ class BroadPhase:
         """Set lowest and highest corner of the tissue [m] after a step of `dt` [s]."""
         self._bounds_before, self._bounds, self._seconds = self._bounds, bounds, dt
         self._shift = None
-        if self._separating.is_found:
+        if self._separating.axis is not None:
             self._separating.tissue_moved(self._shift_of_bounds())
 
     def _shift_of_bounds(self) -> float:

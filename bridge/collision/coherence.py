@@ -38,7 +38,8 @@ class SeparatingAxis:
         self._height = 0.0 if shape is None else shape.height
         self._half_thickness = 0.0 if shape is None else 0.5 * shape.thickness
         self._reach = math.hypot(self._height, self._half_thickness)
-        self._axis: tuple[float, float, float] | None = None
+        self.axis: tuple[float, float, float] | None = None
+        """Axis that separated blade and tissue in the last query, towards the tissue; or None."""
         self._gap = 0.0
         self._gap_at: Pose | None = None
 
@@ -46,17 +47,12 @@ class SeparatingAxis:
         """Find the axis on which the gap between two boxes is largest; it points to the tissue."""
         gap, axis = largest_gap(blade, tissue)
         x, y, z = axis.tolist()
-        self._axis = (x, y, z) if gap > 0.0 else None
+        self.axis = (x, y, z) if gap > 0.0 else None
         self._gap_at = None
 
     def forget(self) -> None:
         """Forget the axis: blade and tissue are no longer apart."""
-        self._axis = None
-
-    @property
-    def is_found(self) -> bool:
-        """Whether an axis separated blade and tissue in the last query."""
-        return self._axis is not None
+        self.axis = None
 
     def tissue_moved(self, distance: float) -> None:
         """Narrow the gap: no side of the box around the tissue has moved farther than this [m]."""
@@ -73,7 +69,7 @@ class SeparatingAxis:
             bounds: Lowest and highest corner of the tissue at the start [m].
             travel: Distance that the tissue can travel beyond them meanwhile [m].
         """
-        if self._axis is None:
+        if self.axis is None:
             return False
         motion = max(math.dist(before.tip, after.tip), math.dist(before.heel, after.heel))
         turning = math.dist(before.axes, after.axes)
@@ -84,7 +80,7 @@ class SeparatingAxis:
             self._gap_at = after
             if self._gap > _MOST_SIDES * sides:
                 return True
-        forward, along, across, gap = self._projected(self._axis, after, bounds)
+        forward, along, across, gap = self._projected(self.axis, after, bounds)
         self._gap, self._gap_at = gap, after
         return sides * (abs(forward) + abs(along) + abs(across)) < gap
 

@@ -34,6 +34,9 @@ class DrivenPoses(NamedTuple):
     """Poses of the geoms."""
 
 
+_NO_POSES = DrivenPoses()
+
+
 class DrivenLoads(NamedTuple):
     """Loads of the tissue on frames and geoms in a step."""
 
@@ -192,6 +195,8 @@ class DrivenBodies:
     @property
     def poses(self) -> DrivenPoses:
         """Poses to which frames and geoms move; tissue frame."""
+        if not (self._frames or self._contact):
+            return _NO_POSES
         frames = tuple([frame.pose for frame in self._frames])
         return DrivenPoses(frames, NO_GEOMS if self._contact is None else self._contact.poses)
 

@@ -150,7 +150,7 @@ def _motion(frame: FrameData) -> list[float]:
 def _force_parts(frame: FrameData) -> list[float]:
     """Return the parts of the force [N], and the stiffness against displacement [N/m]."""
     there, blade, result = frame.tissue_frame, frame.blade, frame.result
-    contacts, numbers = result.contacts.of_blade, np.empty(15)
+    contacts, numbers = result.contacts_of_blade, np.empty(15)
     if there.is_rotated:
         parts = force_parts(contacts, there.vectors_to_tissue(blade.forward))
         numbers[:9] = there.vectors_to_world(np.array(parts)).ravel()

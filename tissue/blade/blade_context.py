@@ -4,6 +4,7 @@ A call from Python takes 0.4 us for each struct that it passes, measured on a bu
 searches, path and report took 83 us of a frame with a call for each function, and 44 us so.
 """
 
+from operator import attrgetter
 from typing import Any, Final, Self
 
 import numpy as np
@@ -188,6 +189,7 @@ class LazyResult(StepResult):
 
     report: BladeReport
     geoms: GeomContact | None
+    contacts_of_blade = property(attrgetter("report.contacts"))
 
     @classmethod
     def of(cls, report: BladeReport, geoms: GeomContact | None, *others: object) -> Self:

@@ -94,8 +94,18 @@ class BladeCoordinates(NamedTuple):
     """Distance from the blade's plane, positive along its normal [m]."""
 
 
+_SAME_LENGTH = 1e-3
+"""Relative change in length below which an edge counts as the same. Poses in single precision, or
+between two places of a turning blade, differ by less; another edge would begin another incision."""
+
 LEAST_SINE = 1e-6
 """Sine of the angle between edge and `forward` below which the blade would cut along its edge."""
+
+
+@kernel
+def is_other_length(length: float, current: float) -> bool:
+    """Return whether an edge of that length [m] differs from the current one; 0 is no edge."""
+    return abs(length - current) > _SAME_LENGTH * length
 
 
 @kernel

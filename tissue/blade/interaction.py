@@ -12,16 +12,15 @@ from tissue.blade.blade_context import (
     BladeContext,
     release_sides,
     report_step,
-    trace,
     update_anchors,
     update_faces,
 )
 from tissue.blade.blade_state import new_blade_state
-from tissue.blade.edge import NOWHERE, Edge
+from tissue.blade.edge import NOWHERE, Edge, is_other_length
 from tissue.blade.edge_anchors import anchor_stiffness, is_engaged, new_anchors
 from tissue.blade.faces_contact import grown_face_contacts, with_more_faces
 from tissue.blade.faces_search import forget_cells, forget_changed_faces
-from tissue.blade.forces import begin_blade_step, release_edge
+from tissue.blade.forces import release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.spine_contact import new_spine_contacts
 from tissue.blade.spine_search import relocate_spine
@@ -58,11 +57,9 @@ size."""
 CUT_MARGIN = 0.5
 """Distance outside the skin at which the cut begins and ends, per mean node size."""
 
-_BEGIN, _TRACE, _REPORT = SameTypes(begin_blade_step), SameTypes(trace), SameTypes(report_step)
-
-_SAME_LENGTH = 1e-3
-"""Relative change in length below which an edge counts as the same. Poses in single precision, or
-between two places of a turning blade, differ by less; another edge would begin another incision."""
+_REPORT = SameTypes(report_step)
+_RELOCATE, _RELOCATE_SPINE = SameTypes(relocate), SameTypes(relocate_spine)
+_FORGET_CHANGED = SameTypes(forget_changed_faces)
 
 
 AddToReport = Callable[[WrenchReport], None]
@@ -91,17 +88,17 @@ class BladeInteraction:
         self._shape, self._material = blade, material
         self._n_fibres = 0
         self._renew_report()
-        self._edge_length = 0.0
+        self.edge_length = 0.0
         self.edge_now = (NOWHERE, 1.0)
         """The cutting edge over the last time step, and the instant of it that was reached, as a
         fraction."""
-        self._grid = no_grid()
+        self.grid = no_grid()
         self._all_nodes = np.zeros(0, np.int64)
         self._context: BladeContext | None = None
 
     def _renew_report(self) -> None:
         """Make a report with room for all contacts that the blade may have."""
-        self._report = new_report(self.state, self._n_fibres)
+        self.latest_report = new_report(self.state, self._n_fibres)
         self._views: dict[int, RigidContacts] = {}
 
     def make_room_for_fibres(self, n: int) -> None:
@@ -118,7 +115,7 @@ class BladeInteraction:
     @property
     def contacts(self) -> RigidContacts:
         """Contacts of the blade at the end of the last step: views, which the next step changes."""
-        return contacts_of(self._report, self._report.n_contacts)
+        return contacts_of(self.latest_report, self.latest_report.n_contacts)
 
     @property
     def has_faces(self) -> bool:
@@ -132,7 +129,7 @@ class BladeInteraction:
 
     def is_other_edge(self, length: float) -> bool:
         """Return whether an edge of that length [m] differs from the current one; 0 is no edge."""
-        return abs(length - self._edge_length) > _SAME_LENGTH * length
+        return is_other_length(length, self.edge_length)
 
     def expect_usable_edge(self, length: float) -> None:
         """Refuse an edge of a length [m] that does not fit the mesh.
@@ -172,7 +169,7 @@ class BladeInteraction:
             where = (self._shape, length, self._material, self._node_size)
             self.state = self.state.replaced(spine=new_spine_contacts(*where))
         self._renew_report()
-        self._edge_length = length
+        self.edge_length = length
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many tetrahedra; there are no rows of nodes."""
@@ -182,14 +179,10 @@ class BladeInteraction:
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Find the tetrahedra of the anchors again after a pass of a cut."""
         body, visits, change, _ = changed
-        relocate(self.state, body, visits, *self.edge_now)
-        relocate_spine(self.state, body, visits)
+        _RELOCATE.call(self.state, body, visits, *self.edge_now)
+        _RELOCATE_SPINE.call(self.state, body, visits)
         if self._shape is not None:
-            forget_changed_faces(self.state.sides, body, change.dirty, change.n_dirty)
-
-    def begin_step(self, body: Body, edge: Edge, dt: float, is_checked: bool) -> bool:
-        """Begin a time step: impulses are counted from zero; see `begin_blade_step`."""
-        return _BEGIN.call(self.state, body, edge, dt, is_checked)
+            _FORGET_CHANGED.call(self.state.sides, body, change.dirty, change.n_dirty)
 
     def context(
         self, body: Body, visits: Visits, path: Path, bounds: FloatArray, slit_reach: float
@@ -212,16 +205,16 @@ class BladeInteraction:
             or context.body is not body
             or context.visits is not visits
             or context.path is not path
-            or context.grid is not self._grid
-            or context.report is not self._report
+            or context.grid is not self.grid
+            or context.report is not self.latest_report
         ):
             self._context = context = BladeContext(
                 blade=self.state,
                 body=body,
                 visits=visits,
                 path=path,
-                grid=self._grid,
-                report=self._report,
+                grid=self.grid,
+                report=self.latest_report,
                 bounds=bounds,
                 slit_reach=slit_reach,
                 cut_margin=CUT_MARGIN * self._node_size,
@@ -295,13 +288,9 @@ class BladeInteraction:
             self._renew_report()
         else:
             body, margin = context.body, GRID_MARGIN * self._node_size
-            self._grid = build_grid(body, body.positions, margin)
+            self.grid = build_grid(body, body.positions, margin)
             forget_cells(self.state.sides)
         return self.renewed(context)
-
-    def trace(self, context: BladeContext, edge: Edge, when: float) -> float:
-        """Trace the path of the edge; see `tissue.blade.blade_context.trace`."""
-        return _TRACE.call(context, edge, when)
 
     def report(
         self, context: BladeContext, edge: Edge, dt: float, also: AddToReport | None = None
@@ -309,8 +298,8 @@ class BladeInteraction:
         """Return what a time step of `dt` [s] came to, and what `also` adds to that."""
         _REPORT.call(context, edge, dt)
         if also is not None:
-            also(self._report)
-        return blade_report(self._report, self._views)
+            also(self.latest_report)
+        return blade_report(self.latest_report, self._views)
 
     def all_nodes(self, body: Body) -> IntArray:
         """Return 0, 1, 2, ... up to the room that the body has for nodes."""

@@ -2,7 +2,11 @@
 
 import math
 
-from tissue.contact.geometry.faces import update_normals
+from tissue.contact.geometry.faces import (
+    has_room_for_changed,
+    update_changed_faces,
+    update_normals,
+)
 from tissue.contact.narrow.contact_list import (
     DIRECTIONS,
     find_due,
@@ -11,21 +15,23 @@ from tissue.contact.narrow.contact_list import (
 )
 from tissue.contact.narrow.edge_contacts import find_touching_edges
 from tissue.contact.narrow.penetrating_nodes import find_penetrating_nodes
-from tissue.contact.response.contacts import PenaltyForces
+from tissue.contact.response.contacts import PenaltyForces, clear_contact_totals
 from tissue.contact.response.stiffness import Limits, fade, limit_stiffness, recover, split_masses
 from tissue.contact.search.edge_pairs import pair_edges
 from tissue.contact.search.node_motion import DIVERGED, IN_BALL, measure_motion, note_places
 from tissue.contact.search.pair_update import SKIN_PATH, take_faces, update_pairs
 from tissue.contact.search.search_state import SearchState
+from tissue.contact.search.self_proximity import find_self_proximity
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.mesh.body import Body
+from tissue.mesh.changes import Change
 
 BEGIN, _PAIRS, _LIST = 0, 1, 2
 """Stages of a search: it begins; pairs are updated; contacts are listed."""
 
-DONE, NO_ROOM_FOR_PAIRS, NO_ROOM_FOR_CONTACTS = 0, 1, 2
-"""Results of a search."""
+DONE, NO_ROOM_FOR_PAIRS, NO_ROOM_FOR_CONTACTS, NEEDS_SKIN = 0, 1, 2, 3
+"""Results of a search; the last one: skin is near itself, and has no faces yet."""
 
 SEARCHES_TO_NORMALS = 8
 """Searches after which normals are computed again where no pair is updated."""
@@ -33,6 +39,84 @@ SEARCHES_TO_NORMALS = 8
 _SEARCHES_TO_NEW_FACES = 4
 """Searches after which faces that a cut made are paired. Those that are gone still have their
 nodes, so that what they hold meanwhile keeps its momentum."""
+
+
+@kernel
+def begin_contacts(search: SearchState, forces: PenaltyForces) -> None:
+    """Clear the totals of a time step, and search before its first substep."""
+    if search.has_touched == 1:
+        clear_contact_totals(forces)
+    search.has_touched = 1 if search.n_found > 0 else 0
+    search.is_searched = search.is_tested = 0
+
+
+@kernel
+def take_changed_faces(search: SearchState, body: Body, change: Change) -> bool:
+    """Take the faces of tetrahedra that a pass of a cut changed; return whether there was room."""
+    if not has_room_for_changed(search.faces, change):
+        return False
+    update_changed_faces(search.faces, body, change)
+    search.has_new_faces = search.is_listing_due = 1
+    search.is_searched = 0
+    if search.faces.n_places > 0:
+        search.is_awake = 1
+    return True
+
+
+@kernel
+def wake_contacts(search: SearchState, body: Body) -> int:
+    """Test once in a time step whether skin is near itself, or the floor near.
+
+    `is_awake` says then whether anything could touch.
+
+    Returns:
+        DONE, or NEEDS_SKIN: call again with faces of skin.
+    """
+    if search.acts == 1 and search.is_tested == 0:
+        is_near = find_self_proximity(search.proximity, search.motion, search.faces, body)
+        if is_near and search.faces.has_skin == 0:
+            return NEEDS_SKIN
+        search.is_tested = 1
+        if search.is_awake == 0 and floor_changes(search, body):
+            search.is_awake = 1
+    return DONE
+
+
+@kernel
+def added_frequency(search: SearchState, limits: Limits) -> float:
+    """Return the largest part of contact in w^2 of the body [1/s2]."""
+    return limits.added if search.n_found > 0 else 0.0
+
+
+@kernel
+def prepare_contacts(
+    search: SearchState,
+    forces: PenaltyForces,
+    limits: Limits,
+    body: Body,
+    frequency_squared: FloatArray,
+    highest: float,
+    room: float,
+    seconds: float,
+) -> int:
+    """Find the contacts of a time step, unless this was done since it began.
+
+    The arguments, and what is returned, are those of `search_contacts`; or NEEDS_SKIN.
+    """
+    if search.is_searched == 1:
+        return DONE
+    outcome = wake_contacts(search, body)
+    if outcome != DONE or search.is_awake == 0:
+        return outcome
+    outcome = search_contacts(
+        search, forces, limits, body, frequency_squared, highest, room, seconds
+    )
+    if outcome == DONE:
+        search.is_searched = 1
+        search.n_found = forces.n_contacts
+        if search.n_found > 0:
+            search.has_touched = 1
+    return outcome
 
 
 @kernel

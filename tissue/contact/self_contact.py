@@ -11,34 +11,28 @@ from tissue.contact.geometry.faces import (
     Faces,
     grown_faces,
     new_faces,
-    update_changed_faces,
     with_found_pieces,
     with_room,
     with_skin,
 )
-from tissue.contact.narrow.contact_list import DIRECTIONS, floor_changes
-from tissue.contact.response.contacts import (
-    clear_contact_totals,
-    grown_penalty_forces,
-    new_penalty_forces,
-)
+from tissue.contact.narrow.contact_list import DIRECTIONS
+from tissue.contact.response.contacts import grown_penalty_forces, new_penalty_forces
 from tissue.contact.response.stiffness import new_limits
 from tissue.contact.search.edge_pairs import NOT_LISTED, new_edge_pairs
 from tissue.contact.search.feature_edges import new_feature_edges
 from tissue.contact.search.near_pairs import grown_near_pairs, new_near_pairs
 from tissue.contact.search.node_motion import grown_node_motion, new_node_motion
 from tissue.contact.search.search_state import SearchState
-from tissue.contact.search.self_proximity import (
-    find_self_proximity,
-    grown_self_proximity,
-    new_self_proximity,
-)
+from tissue.contact.search.self_proximity import grown_self_proximity, new_self_proximity
 from tissue.contact.search_stages import (
     BEGIN,
     DONE,
+    NEEDS_SKIN,
     NO_ROOM_FOR_PAIRS,
     SEARCHES_TO_NORMALS,
-    search_contacts,
+    begin_contacts,
+    prepare_contacts,
+    take_changed_faces,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes
@@ -63,8 +57,7 @@ CAPACITY_OF_PAIRS = 1 << 12
 """Pairs that there is room for at first."""
 
 
-_SEARCH, _FIND_PROXIMITY = SameTypes(search_contacts), SameTypes(find_self_proximity)
-_NEARS_FLOOR, _CLEAR = SameTypes(floor_changes), SameTypes(clear_contact_totals)
+_TAKE_CHANGED = SameTypes(take_changed_faces)
 
 _NO_FORCE = np.zeros(3)
 _NO_FORCE.setflags(write=False)  # many results share it
@@ -97,7 +90,7 @@ class SelfContact:
         added = max(ADDED_SHARE * frequency_squared, LEAST_ADDED)
         faces = new_faces(len(body.tetrahedra))
         of_nodes = ("inverted_step", "is_due", "contact", "n_contacts", "listed_at")
-        self._search = SearchState(
+        self.search = SearchState(
             step=0,
             turn=0,
             n_rounds=1,
@@ -110,6 +103,12 @@ class SelfContact:
             since_pairing=0,
             since_normals=SEARCHES_TO_NORMALS,
             n_due=0,
+            acts=int(acts),
+            is_awake=0,
+            is_tested=0,
+            is_searched=0,
+            has_touched=0,
+            n_found=0,
             all_resting_until=0.0,
             faces=faces,
             pairs=new_near_pairs(n_nodes, len(faces.face), CAPACITY_OF_PAIRS),
@@ -129,57 +128,34 @@ class SelfContact:
             share=np.zeros(n_nodes),
             floor=-np.inf if floor is None else float(floor),
         )
+        """Data of the search; another struct where its arrays grow."""
         time = RETARDATION_TIME / np.sqrt(added)
-        self._limits = new_limits(node_size, added)
+        self.limits = new_limits(node_size, added)
+        """Limits of the stiffness and the recovery of contacts."""
         self.forces = new_penalty_forces(n_nodes, friction, time)
-        self._is_awake = False
-        self._is_searched = self._is_tested = False
-        self._n_contacts = 0
-        self._has_touched = False
-        self._acts = acts
         self._find_pieces(body)
 
     @property
     def is_touching(self) -> bool:
         """Whether there are contacts; some are kept ready."""
-        return self._n_contacts > 0
+        return self.search.n_found > 0
 
     @property
     def added_frequency_squared(self) -> float:
         """Largest part of contact in w^2 of the body [1/s2]."""
-        return self._limits.added if self._n_contacts else 0.0
-
-    def wakes(self, body: Body) -> bool:
-        """Search for skin near itself, which may touch, and whether the floor is near.
-
-        Returns:
-            Whether anything could touch.
-        """
-        if self._acts and not self._is_tested:
-            self._is_tested = True
-            search = self._search
-            has_proximity = _FIND_PROXIMITY.call(
-                search.proximity, search.motion, search.faces, body
-            )
-            if has_proximity and not search.faces.has_skin:
-                self._take_skin(with_skin(search.faces, body))
-            self._is_awake = self._is_awake or _NEARS_FLOOR.call(search, body)
-        return self._is_awake
+        return self.limits.added if self.search.n_found else 0.0
 
     def begin(self) -> None:
         """Clear the totals, and search before the next substep."""
-        if self._has_touched:
-            _CLEAR.call(self.forces)
-        self._has_touched = self._n_contacts > 0
-        self._is_searched = self._is_tested = False
+        begin_contacts(self.search, self.forces)
 
     def report(self, dt: float) -> BodyContacts:
         """Return the contacts since `begin`; `dt` is the time that has passed [s]."""
-        if not self._has_touched:
+        if not self.search.has_touched:
             return _NOTHING_TOUCHES
         forces = self.forces
         per_second = 1.0 / dt if dt > 0.0 else 0.0
-        has_floor = self._search.floor > -np.inf
+        has_floor = self.search.floor > -np.inf
         return BodyContacts(
             n_contacts=forces.n_pressing,
             penetration=forces.penetration,
@@ -204,40 +180,37 @@ class SelfContact:
             room: What may be added to that without another step [1/s2].
             seconds: Length of the time step [s].
         """
-        if self._is_searched or not self.wakes(body):
-            return
-        self._is_searched = True
+        numbers = frequency_squared, highest, room, seconds
         while True:
-            of_contact = self._search, self.forces, self._limits
-            found = _SEARCH.call(*of_contact, body, frequency_squared, highest, room, seconds)
+            found = prepare_contacts(self.search, self.forces, self.limits, body, *numbers)
             if found == DONE:
-                break
-            if found == NO_ROOM_FOR_PAIRS:
-                self._double_room_for_pairs()
-            else:
-                self._make_room_for_contacts(body)
-        self._n_contacts = self.forces.n_contacts
-        self._has_touched = self._has_touched or self._n_contacts > 0
+                return
+            self.make_room(found, body)
+
+    def make_room(self, lacking: int, body: Body) -> None:
+        """Make room for what a search found full (`tissue.contact.search_stages.DONE`)."""
+        if lacking == NEEDS_SKIN:
+            self._take_skin(with_skin(self.search.faces, body))
+        elif lacking == NO_ROOM_FOR_PAIRS:
+            self._double_room_for_pairs()
+        else:
+            self._make_room_for_contacts(body)
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""
-        if not self._acts:
+        if not self.search.acts:
             return
-        faces = with_room(self._search.faces, 4 * changed.change.n_dirty)
-        update_changed_faces(faces, changed.body, changed.change)
-        self._take_faces(faces)
-        self._search.has_new_faces = self._search.is_listing_due = 1
-        self._is_searched = False
-        self._is_awake = self._is_awake or faces.n_places > 0
+        while not _TAKE_CHANGED.call(self.search, changed.body, changed.change):
+            self._take_faces(with_room(self.search.faces, 4 * changed.change.n_dirty))
 
     def incision_ended(self, body: Body) -> None:
         """Add the skin of pieces, where the body is in pieces now."""
-        self._search.recovered[:] = 0.0
+        self.search.recovered[:] = 0.0
         self._find_pieces(body)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for a body of `n_nodes` and `n_tetrahedra`."""
-        search = self._search
+        search = self.search
         of_nodes = (
             "inverted_step",
             "is_due",
@@ -249,7 +222,7 @@ class SelfContact:
         of_floor = ("floor_contact", "floor_listed_at")
         of_edges = ("edge_contact", "edge_contact_at")
         others = (*of_floor, *of_edges, "recovered", "share", "normal")
-        self._search = search.replaced(
+        self.search = search.replaced(
             faces=grown_faces(search.faces, n_tetrahedra),
             pairs=grown_near_pairs(search.pairs, n_nodes),
             motion=grown_node_motion(search.motion, n_nodes),
@@ -259,34 +232,34 @@ class SelfContact:
 
     def _find_pieces(self, body: Body) -> None:
         """Find out whether the body is in pieces; their skin may touch then, too."""
-        if not self._acts:
+        if not self.search.acts:
             return
-        faces = with_found_pieces(self._search.faces, body)
+        faces = with_found_pieces(self.search.faces, body)
         if faces is not None:
             self._take_skin(faces)
 
     def _take_skin(self, faces: Faces) -> None:
         """Take faces with skin among them; what may touch is tested again."""
         self._take_faces(faces)
-        self._is_awake = True
-        self._search.is_pairing_due = 1
-        self._search.motion.largest_path = np.inf
+        self.search.is_awake = 1
+        self.search.is_pairing_due = 1
+        self.search.motion.largest_path = np.inf
 
     def _take_faces(self, faces: Faces) -> None:
         """Take these faces, which may be in other arrays than before."""
-        if faces is not self._search.faces:
-            self._search = self._search.replaced(faces=faces)
+        if faces is not self.search.faces:
+            self.search = self.search.replaced(faces=faces)
 
     def _double_room_for_pairs(self) -> None:
         """Make room for twice as many pairs, and for all faces; all is paired again."""
-        search = self._search
+        search = self.search
         room = len(search.pairs.wake)
         n_faces = max(len(search.faces.face), len(search.pairs.triangle))
         n_edges = len(search.edges.is_feature)
         edge_pairs = new_edge_pairs(2 * len(search.edge_pairs.wake))
         edge_pairs.first = search.edge_pairs.first
         edge_pairs.n_contacts = search.edge_pairs.n_contacts
-        self._search = search.replaced(
+        self.search = search.replaced(
             pairs=new_near_pairs(len(search.share), n_faces, room),
             edges=new_feature_edges(max(n_faces, n_edges // 3)),
             edge_pairs=edge_pairs,
@@ -294,7 +267,7 @@ class SelfContact:
 
     def _make_room_for_contacts(self, body: Body) -> None:
         """Make room for twice as many contacts as there may be."""
-        search, first = self._search, self.forces.first
+        search, first = self.search, self.forces.first
         on_floor = body.n_nodes if np.isfinite(search.floor) else 0
         edges = search.edge_pairs
         n_new = DIRECTIONS * search.pairs.n_nodes + on_floor + edges.n_touching

@@ -8,10 +8,12 @@ Python does not unpack the arrays.
 In Python, and with the JIT off, an `Arrays` is a plain object with its fields as attributes.
 """
 
+import ctypes
 import functools
 import hashlib
 import inspect
 from array import array
+from operator import attrgetter
 from typing import Annotated, Any, ClassVar, NoReturn, Self
 
 import numpy as np
@@ -78,20 +80,16 @@ def _n_words(field: types.Type) -> int:
     return len(field) if isinstance(field, types.NamedUniTuple) else 1
 
 
-class _Cell:
-    """An entry at the begin of a struct's table, as an attribute."""
+def _cell(name: str, place: int, is_float: bool) -> property:
+    """Return an entry at the begin of a struct's table, as an attribute.
 
-    def __init__(self, place: int, is_float: bool) -> None:
-        self._place = place
-        self._is_float = is_float
+    It is read without a call of Python, in two thirds of the time.
+    """
 
-    def __get__(self, struct: Any, owner: type) -> int | float:
-        # A view of memory is read in half the time of an array.
-        value: int | float = (struct._floats if self._is_float else struct._ints)[self._place]
-        return value
+    def write(struct: Any, value: float) -> None:
+        (struct._float_cells if is_float else struct._table)[place] = value
 
-    def __set__(self, struct: Any, value: float) -> None:
-        (struct._float_cells if self._is_float else struct._table)[self._place] = value
+    return property(attrgetter(f"_cell_values.{name}"), write)
 
 
 class Arrays:
@@ -110,6 +108,7 @@ class Arrays:
     _types: ClassVar[dict[Any, ArraysType]] = {}
     _most_types: ClassVar[int] = 1
     _cells: ClassVar[tuple[str, ...]] = ()
+    _layout: ClassVar[type[ctypes.Structure]] = ctypes.Structure
     address: int
     """Where the table is in memory; the object keeps it and the arrays alive."""
 
@@ -118,8 +117,11 @@ class Arrays:
         cls._most_types = 2 if two_precisions else 1
         fields = inspect.get_annotations(cls)
         cls._cells = tuple(name for name, kind in fields.items() if kind in (IntCell, FloatCell))
+        kinds = [ctypes.c_double if fields[n] is FloatCell else ctypes.c_int64 for n in cls._cells]
+        layout = {"_fields_": [*zip(cls._cells, kinds, strict=True)]}
+        cls._layout = type(cls.__name__, (ctypes.Structure,), layout)
         for place, name in enumerate(cls._cells):
-            setattr(cls, name, _Cell(place, fields[name] is FloatCell))
+            setattr(cls, name, _cell(name, place, fields[name] is FloatCell))
 
     def __init__(self, **fields: Any) -> None:
         annotations = type(self).__annotations__
@@ -153,7 +155,7 @@ class Arrays:
                 kinds.append((name, _array_type(value.dtype, value.ndim)))
         self._table = np.array(words, dtype=np.int64)
         self._float_cells = self._table.view(np.float64)
-        self._ints, self._floats = self._table.data, self._float_cells.data
+        self._cell_values = self._layout.from_buffer(self._table.data)
         self.address = self._table.ctypes.data
         # Numba takes long to compare types; each of these is one object that stays.
         known, key = self._types, tuple([id(kind) for _, kind in kinds])

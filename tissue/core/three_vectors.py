@@ -84,19 +84,21 @@ def _vector(k: int) -> Callable[[Any], FloatArray]:
     return lambda vectors: _arrays_of(vectors)[k]
 
 
-def _kept_numbers(vectors: Any) -> Nine:
-    """Return the numbers that vectors were made of, if no array was made of them."""
-    return vectors.__dict__.get("numbers") or _numbers_of(vectors)
+class _Numbers:
+    """The numbers of vectors of which arrays were made; before, each object has its own."""
+
+    def __get__(self, vectors: Any, kind: type) -> Nine:
+        return _numbers_of(vectors)
 
 
 @lazy_fields(tip=_vector(0), heel=_vector(1), forward=_vector(2))
 class _LazySegment(BladeSegment):
-    numbers = property(_kept_numbers)
+    numbers: Any = _Numbers()
 
 
 @lazy_fields(force=_vector(0), torque=_vector(1), point=_vector(2))
 class _LazyWrench(Wrench):
-    numbers = property(_kept_numbers)
+    numbers: Any = _Numbers()
 
 
 _new: Any = tuple.__new__

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.core.jit import SameTypes
 from tissue.elasticity.collapse import grown_collapse, no_collapse, renew_collapsing
 from tissue.elasticity.finite_elements import (
     build_stars,
@@ -32,6 +33,9 @@ from tissue.mesh.star import LARGEST_STAR, Visits
 ROOM_FOR_SPRINGS = 1 << 16
 """Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
 
+_FORGET_ADDED_MASS, _BUILD_ROWS = SameTypes(forget_added_mass), SameTypes(build_rows)
+_RETURN_SPIN = SameTypes(return_spin)
+
 
 class Elasticity:
     """Springs and elements of a body, and a bound on its frequencies.
@@ -58,7 +62,10 @@ class Elasticity:
         is_single: bool = False,
         resists_collapse: bool = True,
     ) -> None:
-        self._material = material
+        self._density, self._spring_modulus = material.density, material.spring_modulus
+        self._relaxes = bool(material.prony)
+        self._update_frequencies = SameTypes(update_frequencies)
+        self._renew_collapsing = SameTypes(renew_collapsing)
         self.is_single = is_single
         """Whether forces of tetrahedra are computed in single precision."""
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
@@ -100,10 +107,10 @@ class Elasticity:
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Update masses, springs, elements and bounds after a pass of a cut."""
         body, visits, change, nodes = changed
-        if self.relaxes:
+        if self._relaxes:
             inherit_relaxed(self.arrays.solid, change.children, change.n_children)
         self._write(body, visits, change.dirty[: change.n_dirty], nodes)
-        return_spin(body, change, self._material.density, nodes, len(nodes))
+        _RETURN_SPIN.call(body, change, self._density, nodes, len(nodes))
 
     def return_mass(self, body: Body) -> None:
         """Take back mass that nodes got between cuts and do not need at rest."""
@@ -113,7 +120,7 @@ class Elasticity:
     @property
     def relaxes(self) -> bool:
         """Whether the stress of held tissue relaxes."""
-        return bool(self._material.prony)
+        return self._relaxes
 
     @property
     def frequency_squared(self) -> float:
@@ -155,22 +162,22 @@ class Elasticity:
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
         n = len(nodes)
-        forget_added_mass(self.arrays.scaling, body, nodes, n)
+        _FORGET_ADDED_MASS.call(self.arrays.scaling, body, nodes, n)
         self._write_springs(body, visits, nodes)
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
-        update_frequencies(self.arrays, body, visits, nodes, n)
+        self._update_frequencies.call(self.arrays, body, visits, nodes, n)
         collapsing, highest = self.arrays.collapsing, self.arrays.highest
-        renew_collapsing(collapsing, body, tetrahedra, len(tetrahedra), highest)
+        self._renew_collapsing.call(collapsing, body, tetrahedra, len(tetrahedra), highest)
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
-        density, modulus = self._material.density, self._material.spring_modulus
+        density, modulus = self._density, self._spring_modulus
         left = nodes
         while True:
             springs = self.arrays.springs
             rows = (body, visits, springs, left, len(left), density, modulus, self._around)
-            left = left[build_rows(*rows) :]
+            left = left[_BUILD_ROWS.call(*rows) :]
             if not len(left):
                 return
             larger = grown_springs(springs, len(springs.first), 2 * len(springs.neighbour))

@@ -1,4 +1,4 @@
-"""Relaxation (RX) of an increment in one call: faces of the blade, motion, anchors of the edge.
+"""Relaxation (RX) of an increment in one call: contacts, blade, motion, anchors of the edge.
 
 One loop of steps for every method that moves all nodes together (`tissue.integrators.methods`).
 
@@ -7,7 +7,7 @@ with a call for each stage an increment took 40 to 60 us besides what the body c
 needs room, a call returns; after room was made the next call goes on with that stage.
 """
 
-from typing import Final
+from typing import Final, NamedTuple
 
 from tissue.blade.blade_context import (
     GRID_IS_FULL,
@@ -19,6 +19,14 @@ from tissue.blade.blade_context import (
     update_faces,
 )
 from tissue.blade.edge import Edge
+from tissue.contact.response.stiffness import Limits
+from tissue.contact.search.search_state import SearchState
+from tissue.contact.search_stages import (
+    DONE,
+    added_frequency,
+    prepare_contacts,
+    wake_contacts,
+)
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
@@ -29,7 +37,14 @@ from tissue.integrators.damping import damp_if_due, relax_stress
 from tissue.integrators.methods import NYSTROEM, RUNGE_KUTTA
 from tissue.integrators.nystroem import nystroem_step
 from tissue.integrators.runge_kutta import runge_kutta_step
-from tissue.integrators.step_size import StepChoice, begin_increment, next_part, note_rest
+from tissue.integrators.step_size import (
+    StepChoice,
+    begin_increment,
+    next_part,
+    note_rest,
+    room_for_contact,
+    wake,
+)
 from tissue.integrators.verlet import verlet_step
 from tissue.mesh.bounding_boxes import write_bounds
 
@@ -40,10 +55,24 @@ NOT_FINITE: Final = -1
 UNSTABLE: Final = -2
 """The motion became unstable; the increment is not done."""
 
-FIND_FACES: Final = 0
-"""Stage in which an increment begins: the search for faces."""
-_STEPS, _ANCHORS, _ANCHORS_AGAIN = 1, 2, 3
+LACKS_FOR_CONTACTS: Final = 10
+"""The search for contacts needs room; this and what it needs (`tissue.contact.search_stages`)."""
+
+FIND_CONTACTS: Final = 0
+"""Stage in which an increment begins: the search for contacts."""
+_FACES, _STEPS, _ANCHORS, _ANCHORS_AGAIN = 1, 2, 3, 4
 """Those that follow; the last one where the grid was full, and is new now."""
+
+
+class _Part(NamedTuple):
+    """A part of a time step."""
+
+    dt: float
+    """Length of the time step [s]."""
+    begin: float
+    """Fraction of the time step at which the increment begins."""
+    end: float
+    """Fraction of the time step at which it ends."""
 
 
 class Relaxation(Arrays, two_precisions=True):
@@ -59,31 +88,52 @@ class Relaxation(Arrays, two_precisions=True):
     """Into how many steps the increment is divided."""
     blade: BladeContext
     """What searches of the blade work on."""
+    contacts: SearchState
+    """What the search for contacts works on."""
+    limits: Limits
+    """Limits of the stiffness of contacts."""
     nodes: IntArray
     """0, 1, 2, ... up to the room for nodes."""
 
 
 @kernel
 def relax(
-    relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
+    relaxation: Relaxation,
+    edge: Edge,
+    has_blade: bool,
+    dt: float,
+    begin: float,
+    end: float,
+    held: float,
+    is_again: bool,
 ) -> int:
     """Relax by an increment; return RELAXED, or what went wrong, or what needs room.
 
-    `relaxation.choice` says how many steps were taken.
+    `relaxation.choice` says how many steps were taken, and the geoms what work they did.
 
     Args:
-        relaxation: Written. What contact adds to w^2 is in its choice of steps.
+        relaxation: Written.
         edge: The cutting edge over the time step.
         has_blade: Whether there is one.
         dt: Length of the time step [s].
         begin: Fraction of the time step at which the increment begins.
         end: Fraction of the time step at which it ends.
+        held: Largest part of attachments in w^2 of the body [1/s2].
+        is_again: Whether a call before lacked room.
     """
-    outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
+    choice, step, part = relaxation.choice, relaxation.step, _Part(dt, begin, end)
+    if not is_again:
+        relaxation.stage = FIND_CONTACTS
+        step.geoms.work = step.geoms.dissipated = 0.0
+        if step.geoms.n_contacts > 0:
+            wake(choice)
+    outcome = _find_contacts(relaxation, part, held)
+    if outcome != RELAXED:
+        return outcome
+    outcome = _begin(relaxation, edge, has_blade, part)
     if outcome != RELAXED:
         return outcome
     if relaxation.stage == _STEPS:
-        choice, step = relaxation.choice, relaxation.step
         while next_part(choice, step):
             parts = choice.begin, choice.part_end, choice.n_steps
             take_steps(step, choice.method, edge, choice.dt, *parts)
@@ -127,21 +177,41 @@ def _take_step(
 
 
 @kernel
-def _begin(
-    relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
-) -> int:
+def _find_contacts(relaxation: Relaxation, part: _Part, held: float) -> int:
+    """Find the contacts of an increment, but of a body at rest; return what needs room."""
+    if relaxation.stage != FIND_CONTACTS:
+        return RELAXED
+    choice, step = relaxation.choice, relaxation.step
+    search, limits = relaxation.contacts, relaxation.limits
+    span = part.dt * (part.end - part.begin)
+    if span > 0.0 and choice.is_at_rest == 0:
+        outcome = wake_contacts(search, step.body)
+        if outcome == DONE and search.is_awake == 1:
+            elastic = step.elastic
+            room = room_for_contact(choice, step, span)
+            bounds = elastic.frequency_squared, elastic.highest, room
+            outcome = prepare_contacts(search, step.contacts, limits, step.body, *bounds, span)
+        if outcome != DONE:
+            return LACKS_FOR_CONTACTS + outcome
+    choice.of_contact = added_frequency(search, limits) + held
+    relaxation.stage = _FACES
+    return RELAXED
+
+
+@kernel
+def _begin(relaxation: Relaxation, edge: Edge, has_blade: bool, part: _Part) -> int:
     """Find the faces that the blade may touch, and begin the steps; return what needs room."""
-    if relaxation.stage != FIND_FACES:
+    if relaxation.stage != _FACES:
         return RELAXED
     if relaxation.has_faces == 1:
         if has_blade:
             n_nodes = relaxation.step.body.n_nodes
-            outcome = update_faces(relaxation.blade, edge, begin, relaxation.nodes, n_nodes)
+            outcome = update_faces(relaxation.blade, edge, part.begin, relaxation.nodes, n_nodes)
             if outcome != NOT_SEARCHED and outcome != SEARCHED:
                 return outcome
         else:
             release_sides(relaxation.step.blade)
-    begin_increment(relaxation.choice, relaxation.step, dt, begin, end)
+    begin_increment(relaxation.choice, relaxation.step, part.dt, part.begin, part.end)
     relaxation.stage = _STEPS
     return RELAXED
 
@@ -151,7 +221,7 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
     """Do what follows the steps; return RELAXED, or what went wrong, or what needs room."""
     step, choice = relaxation.step, relaxation.choice
     if relaxation.stage == _STEPS:
-        relaxation.stage = FIND_FACES
+        relaxation.stage = FIND_CONTACTS
         if choice.is_unstable == 1:
             return UNSTABLE
         if choice.done > 0:
@@ -170,5 +240,5 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
         if outcome == GRID_IS_FULL:
             relaxation.stage = _ANCHORS_AGAIN
             return GRID_IS_FULL
-    relaxation.stage = FIND_FACES
+    relaxation.stage = FIND_CONTACTS
     return RELAXED

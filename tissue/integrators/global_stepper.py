@@ -1,6 +1,7 @@
 """All nodes together, in as many equal steps as stability needs; and which integrator is chosen."""
 
 import math
+from operator import is_
 
 from tissue.blade.blade_context import BladeContext
 from tissue.core.jit import SameTypes
@@ -8,7 +9,7 @@ from tissue.core.limits import MANY_SUBSTEPS, MOST_SUBSTEPS
 from tissue.cut_settings import undamped_steps
 from tissue.forces.step_context import Increment
 from tissue.integrators.driver import (
-    FIND_FACES,
+    LACKS_FOR_CONTACTS,
     NOT_FINITE,
     RELAXED,
     UNSTABLE,
@@ -21,21 +22,12 @@ from tissue.integrators.methods import Hierarchical, IntegratorOptions, Method
 from tissue.integrators.model import TissueModel
 from tissue.integrators.resting import TIME_TO_REST
 from tissue.integrators.stability import stable_step
-from tissue.integrators.step_size import (
-    StepChoice,
-    new_step_choice,
-    room_for_contact,
-)
+from tissue.integrators.step_size import StepChoice, new_step_choice, wake
 from tissue.integrators.threads import Threads
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
 
-_ROOM = SameTypes(room_for_contact)
-
-_SURELY_FEW = 0.1
-"""Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
-longest step need not be computed. It takes some 1.3 steps at most for each of them, by
-`tissue.integrators.stability.STABILITY_LIMIT`."""
+_WAKE = SameTypes(wake)
 
 
 class GlobalStepper:
@@ -48,58 +40,63 @@ class GlobalStepper:
 
     moved = None
     moving = None
-    _refinement = 1
 
     def __init__(self, method: Method, threads: int = 1) -> None:
         self.method = method
         self._relax = SameTypes(relax)
         self._threads = Threads(threads) if threads > 1 else None
-        self._choice: StepChoice | None = None
+        self.choice: StepChoice | None = None
         self._relaxation: Relaxation | None = None
+        self._parts: tuple[object, ...] = ()
+        self.refinement = 1
+        """Into how many times as many increments, and these into steps, a time step is divided. It
+        is 1, but where a step is repeated."""
 
-    @property
-    def refinement(self) -> int:
-        """Into how many times as many increments, and these into steps, a time step is divided.
-
-        It is 1, but where a step is repeated.
-        """
-        return self._refinement
-
-    @refinement.setter
-    def refinement(self, refinement: int) -> None:
-        self._refinement = refinement
-        if self._choice is not None:
-            self._choice.refinement = refinement
+    def refine(self, refinement: int) -> None:
+        """Divide time steps into that many times as many increments, and these into steps."""
+        self.refinement = refinement
+        if self.choice is not None:
+            self.choice.refinement = refinement
 
     def relax(
-        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, arrays: Relaxation, increment: Increment, has_blade: bool
     ) -> int:
         """Relax by an increment; return the steps taken. See `Integrator.relax`."""
-        contact = system.contact
-        edge, dt, begin, end = increment
-        choice = self._choice_for(system)
-        if increment.span > 0.0 and not choice.is_at_rest and contact.wakes(system.body):
-            choice = self._find_contacts(system, increment, choice)
         if self._threads is not None:
-            self._threads.join(system.context)
-        stage = FIND_FACES
+            self._threads.join(arrays.step)
+        is_again = False
+        edge, dt, begin, end = increment
         while True:
-            arrays = self._arrays(system, blade, choice, stage)
-            outcome = self._relax.call(arrays, edge, has_blade, dt, begin, end)
+            numbers = dt, begin, end, system.added_by_attachments
+            outcome = self._relax.call(arrays, edge, has_blade, *numbers, is_again)
             if outcome == RELAXED:
                 break
-            if outcome == UNSTABLE:
-                raise UnstableError(
-                    f"it would take {choice.needed:.2g} steps of the integrator to go on, where "
-                    f"tissue at rest takes {math.ceil(choice.at_rest)}"
-                )
-            if outcome == NOT_FINITE:
-                raise not_finite()
-            blade, stage = system.with_blade_room(outcome, blade), arrays.stage
-        n = choice.done
-        if n > 0:
+            arrays, is_again = self._with_room(outcome, system, arrays), True
+        n = arrays.choice.done
+        if n > 0 and system.increments_to_pieces > 0:
             system.find_new_loose_pieces()
         return n
+
+    def _with_room(self, outcome: int, system: TissueModel, arrays: Relaxation) -> Relaxation:
+        """Return the arrays with room for what an increment lacked.
+
+        Raises:
+            UnstableError: it lacked nothing, but went wrong.
+        """
+        if outcome == UNSTABLE:
+            choice = arrays.choice
+            raise UnstableError(
+                f"it would take {choice.needed:.2g} steps of the integrator to go on, where "
+                f"tissue at rest takes {math.ceil(choice.at_rest)}"
+            )
+        if outcome == NOT_FINITE:
+            raise not_finite()
+        blade = arrays.blade
+        if outcome > LACKS_FOR_CONTACTS:
+            system.contact.make_room(outcome - LACKS_FOR_CONTACTS, system.body)
+        else:
+            blade = system.interaction.with_room(outcome, blade)
+        return self.arrays(system, blade, arrays.stage)
 
     def take_steps(self, system: TissueModel, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
@@ -107,50 +104,35 @@ class GlobalStepper:
             self._threads.join(system.context)
         take_steps(system.context, self.method.number, *increment, n)
 
-    def _find_contacts(
-        self, system: TissueModel, increment: Increment, choice: StepChoice
-    ) -> StepChoice:
-        """Find the contacts of an increment; return the choice of steps with what they add."""
-        room = _ROOM.call(choice, system.context, increment.span)
-        system.find_contacts(increment.span, room)
-        return self._choice_for(system)
-
     def _choice_for(self, system: TissueModel) -> StepChoice:
-        """Return the choice of steps, with what contact adds to the frequencies now."""
-        choice, n_nodes = self._choice, len(system.body.masses)
+        """Return the choice of steps."""
+        choice, n_nodes = self.choice, len(system.body.masses)
         if choice is None or len(choice.no_frequency) != n_nodes:
             where = (system.node_size, system.surroundings, n_nodes)
-            self._choice = choice = new_step_choice(self.method.number, *where)
-            choice.refinement = self._refinement
-        choice.of_contact = system.contact.added_frequency_squared + system.added_by_attachments
+            self.choice = choice = new_step_choice(self.method.number, *where)
+            choice.refinement = self.refinement
         return choice
 
-    def _arrays(
-        self, system: TissueModel, blade: BladeContext, choice: StepChoice, stage: int
-    ) -> Relaxation:
+    def arrays(self, system: TissueModel, blade: BladeContext, stage: int = 0) -> Relaxation:
         """Return the arrays as one struct; another one where an owner has replaced its own.
 
-        `stage`: where the increment goes on. It is given in each call: what an earlier increment,
-        or one that was rolled back, has left in the struct means nothing.
+        `stage`: where an increment goes on that lacked room.
         """
-        relaxation, step = self._relaxation, system.context
-        if (
-            relaxation is None
-            or relaxation.step is not step
-            or relaxation.blade is not blade
-            or relaxation.choice is not choice
-        ):
-            interaction = system.interaction
-            self._relaxation = relaxation = Relaxation(
+        contact, choice = system.contact, self._choice_for(system)
+        parts = system.context, choice, blade, contact.search
+        if self._relaxation is None or not all(map(is_, parts, self._parts)):
+            self._parts = parts
+            self._relaxation = Relaxation(
                 stage=stage,
-                has_faces=int(interaction.has_faces),
-                step=step,
+                has_faces=int(system.interaction.has_faces),
+                step=parts[0],
                 choice=choice,
                 blade=blade,
-                nodes=interaction.all_nodes(system.body),
+                contacts=contact.search,
+                limits=contact.limits,
+                nodes=system.interaction.all_nodes(system.body),
             )
-        relaxation.stage = stage
-        return relaxation
+        return self._relaxation
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Move the body again; `Solid.is_bound_current` says that bounds have changed."""
@@ -158,8 +140,8 @@ class GlobalStepper:
 
     def wake(self) -> None:
         """Move the body again, which may have been at rest."""
-        if self._choice is not None:
-            self._choice.resting, self._choice.is_at_rest = 0.0, 0
+        if self.choice is not None:
+            _WAKE.call(self.choice)
 
     def let_rest(self, system: TissueModel) -> None:
         """Move a body that has settled only once something acts on it."""
@@ -167,7 +149,7 @@ class GlobalStepper:
 
     def body_moved(self, body: Body) -> None:
         """Forget the bound on the strained body: it is another one now."""
-        self._choice = None
+        self.choice = None
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Do nothing: there are no arrays."""
@@ -188,9 +170,6 @@ def expect_few_steps(system: TissueModel, method: int, dt: float) -> None:
     of_body = system.elasticity.frequency_squared
     of_holds = system.added_by_attachments
     squared = of_body + of_holds + system.contact.added_frequency_squared
-    rate = surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag
-    if dt * (math.sqrt(squared) + rate) <= _SURELY_FEW * MOST_SUBSTEPS:
-        return
     step = stable_step(method, elastic, squared, surroundings)
     if dt <= MOST_SUBSTEPS * step:
         return

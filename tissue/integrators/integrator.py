@@ -2,9 +2,9 @@
 
 from typing import Protocol
 
-from tissue.blade.blade_context import BladeContext
 from tissue.core.array_types import IntArray
 from tissue.forces.step_context import Increment
+from tissue.integrators.driver import Relaxation
 from tissue.integrators.model import TissueModel
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
@@ -29,7 +29,7 @@ class Integrator(Protocol):
         ...
 
     def relax(
-        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, arrays: Relaxation, increment: Increment, has_blade: bool
     ) -> int:
         """Relax (RX) by an increment; return how many steps the finest nodes took.
 
@@ -37,7 +37,7 @@ class Integrator(Protocol):
 
         Args:
             system: Body, forces and contact.
-            blade: What searches of the blade work on.
+            arrays: All arrays as one struct.
             increment: The part of a time step to advance by.
             has_blade: Whether there is a blade.
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from operator import is_
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from tissue.blade_shape import BladeShape
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact, no_geoms
 from tissue.contact.self_contact import SelfContact
+from tissue.core.structs import Arrays
 from tissue.core.thread_team import new_team
 from tissue.core.vec3 import Vec3
 from tissue.cut_settings import MeshMeasures
@@ -119,8 +121,10 @@ class TissueModel:
         """The pieces that are not held, as they were found last."""
         self.touched = np.zeros(len(body.rest), dtype=np.int64)
         """Scratch: nodes that a pass of a cut touched."""
-        self._increments_to_pieces = 0
+        self.increments_to_pieces = 0
+        """Increments after which loose pieces are found again; 0: they are those found last."""
         self._context: StepContext | None = None
+        self._parts: tuple[Arrays, ...] = ()
         self.find_loose_pieces()
 
     def _set_damping(self, *, damps_between_steps: bool) -> None:
@@ -142,43 +146,26 @@ class TissueModel:
 
     @property
     def context(self) -> StepContext:
-        """The arrays as one struct, which stays until an owner replaces its own."""
-        context = self._context
-        if context is None:
-            self._context = context = StepContext(
-                body=self.body,
-                elastic=self.elasticity.arrays,
-                blade=self.interaction.state,
-                contacts=self.contact.forces,
-                geoms=self.geoms.arrays,
-                surroundings=self._in_stages,
-                damping=self.damping,
-                supports=self.supports,
-                attachments=self.attachments,
-                loose=self.loose,
-                stages=self.stages,
-                visits=self.visits,
-                team=new_team(),
-            )
-        return context
-
-    def renew_context(self) -> None:
-        """Forget the struct of all arrays where an owner has replaced its own.
-
-        It follows each call that may have replaced arrays: `context` is used in every step.
-        """
-        context = self._context
-        if context is not None and not (
-            context.body is self.body
-            and context.elastic is self.elasticity.arrays
-            and context.blade is self.interaction.state
-            and context.contacts is self.contact.forces
-            and context.geoms is self.geoms.arrays
-            and context.stages is self.stages
-            and context.attachments is self.attachments
-            and context.loose is self.loose
-        ):
-            self._context = None
+        """The arrays as one struct; another one where an owner has replaced its own."""
+        parts = (
+            self.body,
+            self.elasticity.arrays,
+            self.interaction.state,
+            self.contact.forces,
+            self.geoms.arrays,
+            self._in_stages,
+            self.damping,
+            self.supports,
+            self.attachments,
+            self.loose,
+            self.stages,
+            self.visits,
+        )
+        if self._context is None or not all(map(is_, parts, self._parts)):
+            self._parts = parts
+            fields = zip(StepContext.__annotations__, (*parts, new_team()), strict=True)
+            self._context = StepContext(**dict(fields))
+        return self._context
 
     @contextmanager
     def without_drag(self) -> Iterator[None]:
@@ -186,11 +173,10 @@ class TissueModel:
         in_stages, damping = self._in_stages, self.damping
         self._in_stages = in_stages.replaced(drag=0.0)
         self.damping = damping.replaced(drag=0.0)
-        self._context = None
         try:
             yield
         finally:
-            self._in_stages, self.damping, self._context = in_stages, damping, None
+            self._in_stages, self.damping = in_stages, damping
 
     def relax_stress(self, seconds: float) -> None:
         """Relax the stress of the tissue where it is, for that time [s] or for ever (inf)."""
@@ -200,15 +186,11 @@ class TissueModel:
 
             relax_stress(self.context, seconds)
 
-    def find_contacts(self, seconds: float, room: float = math.inf) -> None:
-        """Find the contacts that act as forces in a time step of that length [s].
-
-        `room`: what may be added to w^2 of the body without another step [1/s2].
-        """
+    def find_contacts(self, seconds: float) -> None:
+        """Find the contacts that act as forces in a time step of that length [s]."""
         elasticity = self.elasticity
         by_node, highest = elasticity.arrays.frequency_squared, elasticity.frequency_squared
-        self.contact.prepare(self.body, by_node, highest, room, seconds)
-        self.renew_context()
+        self.contact.prepare(self.body, by_node, highest, math.inf, seconds)
 
     def touch(
         self,
@@ -221,14 +203,11 @@ class TissueModel:
         See `GeomContact` for the arguments.
         """
         self.geoms = GeomContact(geoms, self.body, self.node_size, origins, rotations)
-        self.renew_context()
         return self.geoms
 
     def find_geom_contacts(self, seconds: float) -> None:
         """Find the contacts with geoms in a time step of that length [s]."""
         self.geoms.begin_step(self.body, seconds)
-        if self.geoms.geoms:
-            self.renew_context()
 
     def take_attachments(
         self, attachments: Attachments, has_fibres: bool, added_frequency_squared: float
@@ -242,18 +221,10 @@ class TissueModel:
         """
         self.attachments, self.has_fibres = attachments, has_fibres
         self.added_by_attachments = added_frequency_squared
-        self.renew_context()
 
     def replace_edge(self, length: float) -> None:
         """Release the tissue, and use an edge of another length [m]; 0 for no edge."""
         self.interaction.replace_edge(length, self.body)
-        self.renew_context()
-
-    def with_blade_room(self, outcome: int, blade: BladeContext) -> BladeContext:
-        """Return what searches of the blade work on with room; see `BladeInteraction.with_room`."""
-        blade = self.interaction.with_room(outcome, blade)
-        self.renew_context()
-        return blade
 
     def find_loose_pieces(self) -> None:
         """Find the pieces that are not held; where they are those of before, keep the struct.
@@ -264,21 +235,19 @@ class TissueModel:
             found = loose_pieces_of(self.body)
             if not are_same_pieces(found, self.loose):
                 self.loose = found
-                self.renew_context()
-        self._increments_to_pieces = 0
+        self.increments_to_pieces = 0
 
     def find_new_loose_pieces(self) -> None:
         """Find them again some increments after the mesh changed, as it may change in each."""
-        if self._increments_to_pieces > 0:
-            self._increments_to_pieces -= 1
-            if self._increments_to_pieces == 0:
-                self.find_loose_pieces()
+        self.increments_to_pieces -= 1
+        if self.increments_to_pieces == 0:
+            self.find_loose_pieces()
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Find loose pieces again some increments later."""
         del changed
-        if self._increments_to_pieces == 0:
-            self._increments_to_pieces = INCREMENTS_TO_PIECES
+        if self.increments_to_pieces == 0:
+            self.increments_to_pieces = INCREMENTS_TO_PIECES
 
     def incision_ended(self) -> None:
         """Update what is tested once the blade has left an incision."""

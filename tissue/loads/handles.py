@@ -53,20 +53,13 @@ class Handles:
         """All loads."""
         self.attachments = AttachmentList()
         """All attachments and ligaments."""
-
-    @property
-    def act(self) -> bool:
-        """Whether there is anything that could act on the body."""
-        return self.loads.act or self.attachments.act or bool(self._model.geoms.geoms)
-
-    @property
-    def keep_awake(self) -> bool:
-        """Whether any of it keeps the body from rest."""
-        return self.loads.act or self.attachments.act or self._model.geoms.act
+        self.act = False
+        """Whether there is a load or an attachment, or one was released since the last step."""
 
     def push(self, load: Load) -> Load:
         """Add a load, which acts from now on; return it."""
         self.loads.add(load)
+        self.act = True
         return load
 
     def points_to_hold(self, where: str | npt.ArrayLike | MaterialPoints) -> MaterialPoints:
@@ -98,7 +91,7 @@ class Handles:
             self.loads.remove(held, model.stages.loads)
         else:
             self.attachments.remove(held, model.body)
-            self._hand_over()
+        self._hand_over()
 
     def move_supports(self, where: str | npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """Move fixed nodes at a velocity [m/s]; see `tissue.Tissue.move_supports`."""
@@ -152,11 +145,9 @@ class Handles:
     # a step
 
     def begin_step(self, dt: float) -> None:
-        """Move attachments that follow a path, and geoms, in a step of that length [s]."""
-        model = self._model
-        model.find_geom_contacts(dt)
+        """Move attachments that follow a path in a step of that length [s]."""
         if not self.attachments.is_idle:
-            self.attachments.begin_step(model.body, dt)
+            self.attachments.begin_step(self._model.body, dt)
             self._hand_over()
 
     def begin_increment(self, increment: Increment, has_blade: bool) -> float:
@@ -164,8 +155,6 @@ class Handles:
         model, loads = self._model, self.loads
         self.attachments.begin_increment(model.body, increment, has_blade)
         model.added_by_attachments = self.attachments.added_frequency_squared
-        touched = model.geoms.arrays
-        touched.work = touched.dissipated = 0.0
         self.spread_loads()
         return loads.virtual_work(model.body)
 
@@ -177,14 +166,12 @@ class Handles:
         model = self._model
         self.attachments.end_increment(model.body, increment)
         of_loads = self.loads.virtual_work(model.body) - before
-        return of_loads + model.attachments.work + model.geoms.arrays.work
+        return of_loads + model.attachments.work
 
     def end_step(self, dt: float) -> None:
-        """Write to attachments what they did in a step of that length [s], and stop geoms."""
-        model = self._model
-        model.geoms.stop()
+        """Write to attachments what they did in a step of that length [s]."""
         if self.attachments.act:
-            self.attachments.end_step(model.body, dt)
+            self.attachments.end_step(self._model.body, dt)
             self._hand_over()
 
     def inputs(self, sweep: BladeSweep | None, dt: float) -> StepInputs:
@@ -196,7 +183,7 @@ class Handles:
         """
         loads, attachments, model = self.loads, self.attachments, self._model
         geoms, supports, body = model.geoms, model.supports, model.body
-        if not (loads.act or attachments.act or geoms.geoms or supports.is_moving):
+        if not (self.act or geoms.geoms or supports.is_moving):
             return StepInputs(sweep, dt)
         n = body.n_nodes
         return StepInputs(
@@ -227,7 +214,7 @@ class Handles:
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Find what attachments hold in a mesh that has changed."""
-        if self.attachments.act:
+        if self.act and self.attachments.act:
             self.attachments.locate(changed.body)
             self._hand_over()
 
@@ -237,6 +224,7 @@ class Handles:
     def _hand_over(self) -> None:
         """Hand the arrays of the attachments over to the model, on which the integrator works."""
         held = self.attachments
+        self.act = self.loads.act or not held.is_idle
         self._model.take_attachments(held.arrays, held.has_fibres, held.added_frequency_squared)
 
 

@@ -19,9 +19,10 @@ from tissue.cutting.incision import NoRoomError
 from tissue.integrators.integrator import REMEDY, UnstableError
 from tissue.loads.handles import StepInputs
 from tissue.mesh.body import Body
+from tissue.mesh.node_motion import is_motion_finite
 from tissue.state.tissue_state import RULES
 from tissue.stepping.judgement import StepWatch
-from tissue.stepping.stages import StepStages
+from tissue.stepping.stages import NOT_FINITE, StepStages
 from tissue.types import StepResult, TissueError
 
 MOST_REPEATS = 3
@@ -38,7 +39,6 @@ mean, a sixth of a second, which is rare."""
 MOST_FRAMES = 1000
 """Time steps after which one is saved in any case: their inputs are kept."""
 
-_BEFORE = "a number of its state was not finite before the step"
 Returned = TypeVar("Returned")
 _log = logging.getLogger("tissue")
 
@@ -70,16 +70,13 @@ class CheckedSteps:
         if self._stopped is not None:
             self.expect_moving()
         stages, watch = self._stages, self.watch
-        is_finite = watch.is_finite(stages.model)
         if self._is_changed:
-            if not is_finite:
-                raise self._stop(_BEFORE, _worst_nodes(stages.model.body), is_repeated=False)
+            if not is_motion_finite(stages.model.body):
+                raise self._stop(NOT_FINITE, _worst_nodes(stages.model.body), is_repeated=False)
             self.save()
         inputs = stages.handles.inputs(sweep, dt)
-        if not is_finite:
-            return self._repeat(inputs, _BEFORE)
         if inputs.supports is not None:  # nodes may have got other velocities
-            watch.look(stages.model)
+            watch.look(stages.context)
         result, fault = self._try(inputs)
         if result is None:
             return self._repeat(inputs, fault)
@@ -137,7 +134,7 @@ class CheckedSteps:
             self.go_back(inputs)
             stages.make_more_room(error.lacking)
             self.save()
-            stages.global_stepper.refinement = refinement
+            stages.global_stepper.refine(refinement)
             return self._try(inputs)
         except UnstableError as error:
             return None, error.fault
@@ -149,7 +146,7 @@ class CheckedSteps:
         energies = result.energies
         residual = 0.0 if energies is None else energies.residual
         amounts = (stages.audit.work_of_loads, residual, sum(result.wrench.numbers))
-        fault = self.watch.fault(stages.model, float(inputs.dt), *amounts)
+        fault = self.watch.fault(stages.context, float(inputs.dt), *amounts)
         return (result, "") if fault is None else (None, fault)
 
     def _repeat(self, inputs: StepInputs, fault: str) -> StepResult:
@@ -162,11 +159,11 @@ class CheckedSteps:
         worst = _worst_nodes(model.body)
         self.go_back(inputs)
         state = self._state_now()
-        self.watch.look(model)
+        self.watch.look(self._stages.context)
         for i in range(1, MOST_REPEATS + 1):
-            stepper.refinement = 2**i
+            stepper.refine(2**i)
             result, fault_again = self._try(inputs)
-            stepper.refinement = 1
+            stepper.refine(1)
             if result is not None:
                 self.n_repeated += 1
                 _log.warning("a step was repeated in steps of 1/%d the length: %s", 2**i, fault)
@@ -193,11 +190,11 @@ class CheckedSteps:
         self._state = self._state_now()
         self.inputs.clear()
         self._n_substeps = 0
-        audit, model = self._stages.audit, self._stages.model
-        edge, when = model.interaction.edge_now
-        energies = audit.energies(model, edge)
+        audit, context = self._stages.audit, self._stages.context
+        edge, when = self._stages.model.interaction.edge_now
+        energies = audit.energies(context, edge)
         residual = 0.0 if energies is None else energies.residual
-        self.watch.begin(model, edge, when, audit.work_of_loads, residual)
+        self.watch.begin(context, edge, when, audit.work_of_loads, residual)
         self._is_changed = False
 
     def _state_now(self) -> Memento:

@@ -7,12 +7,11 @@ import numpy as np
 from tissue.blade.blade_state import clear_works
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
-from tissue.core.jit import kernel
+from tissue.core.jit import SameTypes, kernel
 from tissue.elasticity.energy import elastic_energy, kinetic_energy, potential_energy
 from tissue.forces.attachments import attached_energy
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms
-from tissue.integrators.model import TissueModel
 from tissue.mesh.changes import ChangedMesh
 from tissue.types import Energies
 
@@ -96,12 +95,12 @@ def _write_amounts(
     out[13], out[14] = elastic.scaling.lost, totals.released
 
 
-def _attached(model: TissueModel) -> float:
+def _attached(context: StepContext) -> float:
     """Return the energy in the springs of attachments [J]."""
-    attachments = model.attachments
+    attachments = context.attachments
     if not len(attachments.nodes):
         return 0.0
-    return attached_energy(attachments, model.body.positions, 0, len(attachments.nodes))
+    return attached_energy(attachments, context.body.positions, 0, len(attachments.nodes))
 
 
 class Audit:
@@ -123,30 +122,32 @@ class Audit:
         self.lost_at_geoms = 0.0
         """Energy lost in contacts with rigid geoms since the account began [J]."""
         self._attached_at_first = 0.0
-        self._is_known = False
+        self.is_known = False
+        """Whether the energy is known: the body has not moved since, nor its mesh changed."""
         self._numbers = np.zeros(len(_Amounts._fields))
         self._now = self._at_first = _Amounts(*self._numbers)
+        self._write = SameTypes(_write_amounts)
         self._of: tuple[Edge | None, float] = (None, 0.0)
 
-    def begin(self, model: TissueModel, edge: Edge) -> None:
+    def begin(self, context: StepContext, edge: Edge) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
         if not self._is_kept:
             return
-        model.damping.is_counted = 1
-        model.damping.dissipated = self.lost_at_geoms = 0.0
+        context.damping.is_counted = 1
+        context.damping.dissipated = self.lost_at_geoms = 0.0
         self.changes = MeshChanges()
-        clear_works(model.interaction.state.totals)
-        model.supports.work = self.work_of_loads = 0.0
-        model.elasticity.arrays.scaling.lost = 0.0
-        attachments = model.attachments
+        clear_works(context.blade.totals)
+        context.supports.work = self.work_of_loads = 0.0
+        context.elastic.scaling.lost = 0.0
+        attachments = context.attachments
         attachments.dissipated = attachments.severing = attachments.released = 0.0
-        self._attached_at_first = _attached(model)
+        self._attached_at_first = _attached(context)
         self.forget()
-        self._at_first = self._amounts(model, edge, 1.0)
+        self._at_first = self._amounts(context, edge, 1.0)
 
     def forget(self) -> None:
         """Forget the energy: the body moved, or its mesh changed."""
-        self._is_known = False
+        self.is_known = False
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Forget the energy; what the change took is counted after the cut."""
@@ -156,23 +157,25 @@ class Audit:
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Do nothing: there are no rows of nodes."""
 
-    def before_cut(self, model: TissueModel, edge: Edge, when: float) -> None:
+    def before_cut(self, context: StepContext, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
         if self._is_kept:
-            self._before_cut = self._parts(model, edge, when)
+            self._before_cut = self._parts(context, edge, when)
 
-    def after_cut(self, model: TissueModel, edge: Edge, when: float) -> None:
+    def after_cut(self, context: StepContext, edge: Edge, when: float) -> None:
         """Count the energy that the change of the mesh took; where it has not changed, none."""
-        if self._is_kept and not self._is_known:
-            parts = zip(self.changes, self._before_cut, self._parts(model, edge, when), strict=True)
+        if self._is_kept and not self.is_known:
+            parts = zip(
+                self.changes, self._before_cut, self._parts(context, edge, when), strict=True
+            )
             self.changes = MeshChanges(*(sum_ + after - before for sum_, before, after in parts))
 
-    def energies(self, model: TissueModel, edge: Edge) -> Energies | None:
+    def energies(self, context: StepContext, edge: Edge) -> Energies | None:
         """Return the account at the end of a step; None where none is kept."""
         if not self._is_kept:
             return None
-        now, first = self._amounts(model, edge, 1.0), self._at_first
-        attachments, attached = model.attachments, _attached(model) - self._attached_at_first
+        now, first = self._amounts(context, edge, 1.0), self._at_first
+        attachments, attached = context.attachments, _attached(context) - self._attached_at_first
         in_contacts = now.in_contacts - first.in_contacts
         # What the body gave to contacts, and their springs do not hold.
         lost_in_contacts = (first.work_of_contacts - now.work_of_contacts) - in_contacts
@@ -193,15 +196,15 @@ class Audit:
             released=now.released + attachments.released,
         )
 
-    def _amounts(self, model: TissueModel, edge: Edge, when: float) -> _Amounts:
+    def _amounts(self, context: StepContext, edge: Edge, when: float) -> _Amounts:
         """Return the amounts now; they are remembered until the body moves or its mesh changes."""
-        if not (self._is_known and self._of == (edge, when)):
-            _write_amounts(model.context, edge, when, self._is_known, self._numbers)
+        if not (self.is_known and self._of == (edge, when)):
+            self._write.call(context, edge, when, self.is_known, self._numbers)
             self._now, self._of = _Amounts(*self._numbers.tolist()), (edge, when)
-            self._is_known = True
+            self.is_known = True
         return self._now
 
-    def _parts(self, model: TissueModel, edge: Edge, when: float) -> MeshChanges:
+    def _parts(self, context: StepContext, edge: Edge, when: float) -> MeshChanges:
         """Return the energies of the body and of the anchors [J]."""
-        now = self._amounts(model, edge, when)
+        now = self._amounts(context, edge, when)
         return MeshChanges(now.elastic, now.kinetic, now.potential, now.edge)

@@ -15,7 +15,6 @@ from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms
 from tissue.geometry.aabb import empty_box, with_point
 from tissue.integrators.model import TissueModel
-from tissue.mesh.node_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
 """Energy that may come out of nothing, as a strain of the whole body: a tenth of the speed of waves
@@ -86,49 +85,44 @@ class StepWatch:
             share_unexplained=SHARE_UNEXPLAINED,
         )
         self._write_look, self._judge = SameTypes(write_look), SameTypes(judge_step)
-        self._is_finite = SameTypes(is_motion_finite)
 
-    def is_finite(self, model: TissueModel) -> bool:
-        """Return whether all of the motion of the body is finite."""
-        return self._is_finite.call(model.body)
-
-    def look(self, model: TissueModel) -> None:
+    def look(self, context: StepContext) -> None:
         """Look at the body before a step."""
-        self._write_look.call(model.context, self._bounds.before)
+        self._write_look.call(context, self._bounds.before)
 
     def begin(
-        self, model: TissueModel, edge: Edge, when: float, work_of_loads: float, residual: float
+        self, context: StepContext, edge: Edge, when: float, work_of_loads: float, residual: float
     ) -> None:
         """Look at the body before a step, and count from now on what it is given.
 
         Args:
-            model: The body.
+            context: The body and all that acts on it.
             edge: The cutting edge over the last time step.
             when: Instant of it, as a fraction.
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy now, if one is kept, else 0 [J].
         """
         bounds, now = self._bounds, self._bounds.before
-        self.look(model)
-        own = float(now[KINETIC]) + energy_in_springs(model.context, edge, when)
+        self.look(context)
+        own = float(now[KINETIC]) + energy_in_springs(context, edge, when)
         bounds.without_gravity, bounds.potential = own, float(now[POTENTIAL])
         bounds.work, bounds.dissipated = float(now[WORK]) + work_of_loads, float(now[DISSIPATED])
         bounds.residual = residual
 
     def fault(
-        self, model: TissueModel, dt: float, work_of_loads: float, residual: float, force: float
+        self, context: StepContext, dt: float, work_of_loads: float, residual: float, force: float
     ) -> str | None:
         """Return what is wrong with a step since the last look; None: nothing.
 
         Args:
-            model: The body after it.
+            context: The body after it, and all that acts on it.
             dt: Length of the step [s].
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy after it, if one is kept, else 0 [J].
             force: A sum of what the blade feels: finite, or not.
         """
         bounds = self._bounds
-        found = self._judge.call(model.context, bounds, dt, work_of_loads, residual, force)
+        found = self._judge.call(context, bounds, dt, work_of_loads, residual, force)
         return None if found == ACCEPTED else self._named(found)
 
     def _named(self, found: int) -> str:

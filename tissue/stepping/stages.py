@@ -1,26 +1,28 @@
 """`StepStages`: the stages of a time step, in the order in which `advance` lists them."""
 
 import math
+from operator import is_
 from time import perf_counter
 
 import numpy as np
 
-from tissue.blade.blade_context import NOT_ENGAGED, BladeContext, LazyResult
+from tissue.blade.blade_context import NOT_ENGAGED, LazyResult, trace
 from tissue.blade.edge import NOWHERE, Edge, edge_of, edge_or_error
 from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade.toughness import expect_toughness_in_range
 from tissue.body_view import BodyChunks, bounds_of_body
 from tissue.core.array_types import FloatArray
+from tissue.core.jit import SameTypes
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
 from tissue.cutting.incision import CutHooks, Incision
 from tissue.forces.attachments import fibre_boxes
-from tissue.forces.step_context import Increment
+from tissue.forces.step_context import Increment, StepContext
 from tissue.integrators.equilibrium import SETTLED, settle
 from tissue.integrators.equilibrium_checks import support_of, warn_of_motion
 from tissue.integrators.global_stepper import GlobalStepper, expect_few_steps
-from tissue.integrators.integrator import Integrator
+from tissue.integrators.integrator import Integrator, UnstableError
 from tissue.integrators.model import TissueModel
 from tissue.loads.handles import Handles
 from tissue.material import Material
@@ -31,7 +33,21 @@ from tissue.mesh.star import Visits
 from tissue.mesh.surface import path_error
 from tissue.solver_settings import SolverSettings
 from tissue.stepping.energy_audit import Audit
+from tissue.stepping.frame import (
+    BEGUN,
+    GEOMS_LACK_ROOM,
+    MANY_STEPS,
+    NOT_FINITE_BEFORE,
+    OTHER_EDGE,
+    TOO_FAR,
+    Frame,
+    begin_frame,
+)
 from tissue.types import Chunks, StageTimes, StepResult
+
+_TOUCHED = SameTypes(touched_nodes)
+
+NOT_FINITE = "a number of its state was not finite before the step"
 
 
 class StepStages:
@@ -69,10 +85,13 @@ class StepStages:
         self.chunks = BodyChunks()
         """Boxes that together hold the body."""
         self._slit_reach = slit_reach
+        self._frame: Frame | None = None
+        self._parts: tuple[object, ...] = ()
+        self._begin_frame, self._trace = SameTypes(begin_frame), SameTypes(trace)
         self._bounds = bounds_of_body(model.body)
         self._at_first = model.measures(global_stepper.method.number)
         self.make_room()
-        audit.begin(model, NOWHERE)
+        audit.begin(self.context, NOWHERE)
 
     @property
     def owners(self) -> tuple[Owner, ...]:
@@ -95,22 +114,23 @@ class StepStages:
         )
 
     def advance(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Do the stages of a step; see `tissue.Tissue.step`."""
+        """Do the stages of a step; see `tissue.Tissue.step`.
+
+        Raises:
+            ValueError: no blade can move so, it does not fit the mesh, or the step is too long.
+            UnstableError: a number of the state was not finite before, or the motion is unstable.
+        """
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
         dt = _checked_time_step(dt)
         model, incision, handles = self.model, self.incision, self.handles
-        expect_few_steps(model, self.global_stepper.method.number, dt)
-        travel = edge.travel if has_blade else 0.0
-        n = incision.n_increments(travel)
-        self._begin_step(sweep, edge, dt)
-        handles.begin_step(dt)
-        n = max(n, model.geoms.n_increments) * self.global_stepper.refinement
+        begun = self._begin(sweep, edge, dt)
+        n, travel = begun.n_increments * self.global_stepper.refinement, begun.travel
         n_substeps = 0
         collision = topology = relaxation = 0.0  # wall times
         now = perf_counter()
         for i in range(n):
-            increment, begun = Increment(edge, dt, i / n, (i + 1) / n), now
+            increment, started = Increment(edge, dt, i / n, (i + 1) / n), now
             # RX, relaxation: forces, contact, motion, slip of the blade
             n_substeps += self._relax(increment, has_blade)
             relaxed = perf_counter()
@@ -120,64 +140,87 @@ class StepStages:
             # GC, geometric changes: subdivision, separation
             if is_crossed:
                 incision.cut(self.hooks)
-            elif has_blade and not model.interaction.is_engaged:
+            elif has_blade and incision.has_begun and not model.interaction.is_engaged:
                 self.end_incision()
             now = perf_counter()
-            relaxation += relaxed - begun
+            relaxation += relaxed - started
             collision += detected - relaxed
             topology += now - detected
-        if has_blade and incision.has_rested(travel, dt):
+        if has_blade and incision.has_begun and incision.has_rested(travel, dt):
             incision.open_to_edge(self.hooks)
             topology += perf_counter() - now
+        if model.geoms.are_led:
+            model.geoms.stop()
+        if handles.act:
+            handles.end_step(dt)
         stage_times = StageTimes(collision, topology, relaxation)
-        handles.end_step(dt)
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
-    def _begin_step(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
-        """Take the edge, and start the totals of a step.
+    def _begin(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> Frame:
+        """Take the edge, start the totals of a step, and find where geoms may touch.
 
-        Raises:
-            ValueError: no blade can move so, or it does not fit the mesh.
+        Returns:
+            What the kernels of the step work on: it says how many increments there are.
         """
+        model, has_blade, outcome = self.model, sweep is not None, BEGUN
+        while True:
+            frame = self._frame_now()
+            numbers = dt, model.interaction.edge_length, model.added_by_attachments
+            outcome = self._begin_frame.call(frame, edge, has_blade, *numbers, outcome)
+            if outcome == BEGUN:
+                break
+            self._settle(outcome, sweep, edge, dt)
+        model.geoms.seconds = dt
+        model.interaction.edge_now = (edge, 0.0)
+        if self.handles.act:
+            self.handles.begin_step(dt)
+        return frame
+
+    def _settle(self, outcome: int, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
+        """Do what the begin of a step needs, or refuse the step; see `begin_frame`."""
         model = self.model
-        interaction = model.interaction
-        if sweep is None:
+        if outcome == NOT_FINITE_BEFORE:
+            raise UnstableError(NOT_FINITE)
+        if outcome == MANY_STEPS:
+            expect_few_steps(model, self.global_stepper.method.number, dt)
+        elif outcome == TOO_FAR:
+            self.incision.n_increments(edge.travel)
+        elif outcome == GEOMS_LACK_ROOM:
+            model.geoms.make_room(model.body)
+        elif sweep is None:
             self.take_edge(None)
-        elif interaction.is_other_edge(edge.length):
+        else:
             edge_or_error(sweep)  # before the tissue is released
-            self.take_edge(edge)
-        if not interaction.begin_step(model.body, edge, dt, sweep is None):
-            assert sweep is not None
-            edge_or_error(sweep)  # it takes numbers whose squares are not finite
-            interaction.begin_step(model.body, edge, dt, True)
-        interaction.edge_now = (edge, 0.0)
-        model.contact.begin()
+            if outcome == OTHER_EDGE:
+                self.take_edge(edge)
 
     def _relax(self, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
         model, handles, audit = self.model, self.handles, self.audit
         before, is_driven = 0.0, handles.act
         if is_driven:
-            if handles.keep_awake:
+            if handles.loads.act or handles.attachments.act:
                 self.global_stepper.wake()
             before = handles.begin_increment(increment, has_blade)
-        n = self.integrator.relax(model, self._blade_context, increment, has_blade)
-        if is_driven:
-            audit.work_of_loads += handles.end_increment(before, increment)
-            audit.lost_at_geoms += model.geoms.arrays.dissipated
+        arrays = self._frame_now().relaxation
+        n = self.integrator.relax(model, arrays, increment, has_blade)
+        geoms = model.geoms.arrays
+        of_loads = handles.end_increment(before, increment) if is_driven else 0.0
+        audit.work_of_loads += of_loads + geoms.work
+        audit.lost_at_geoms += geoms.dissipated
         if n > 0:
-            audit.forget()
+            audit.is_known = False
         model.interaction.edge_now = (increment.edge, increment.end)
         return n
 
     def _detect(self, increment: Increment) -> bool:
         """Trace the path of the edge through the material; return whether it crossed anything."""
-        model, incision = self.model, self.incision
-        travel = model.interaction.trace(self._blade_context, increment.edge, increment.end)
+        incision, blade = self.incision, self._frame_now().relaxation.blade
+        travel = self._trace.call(blade, increment.edge, increment.end)
         if travel == NOT_ENGAGED:
             return False
         incision.has_begun = True
-        return incision.detect(model.body, model.visits, travel)
+        return incision.detect(blade.body, blade.visits, travel)
 
     def end_incision(self) -> None:
         """Resolve what the blade left uncut; the next contact begins another incision."""
@@ -191,11 +234,12 @@ class StepStages:
     ) -> StepResult:
         """Return what the step did."""
         model, scheme = self.model, self.incision.scheme
-        report = model.report(self._blade_context, edge, dt)
-        amounts, change = report.amounts, scheme.change
+        frame = self._frame_now()
+        report = model.report(frame.relaxation.blade, edge, dt)
+        amounts, change, geoms = report.amounts, scheme.change, model.geoms
         return LazyResult.of(
             report,
-            model.geoms if model.geoms.act else None,
+            geoms if geoms.arrays.n_contacts > 0 else None,
             int(amounts.n_tetrahedra),
             int(amounts.n_nodes),
             scheme.n_active,
@@ -208,14 +252,38 @@ class StepStages:
             n_substeps,
             model.contact.report(dt),
             stage_times,
-            self.audit.energies(model, edge),
+            self.audit.energies(frame.relaxation.step, edge),
         )
 
     @property
-    def _blade_context(self) -> BladeContext:
-        model = self.model
-        where = (self.incision.path, self._bounds, self._slit_reach)
-        return model.interaction.context(model.body, model.visits, *where)
+    def context(self) -> StepContext:
+        """The body and all that acts on it, as the kernels of an integrator take it."""
+        return self._frame_now().relaxation.step
+
+    def _frame_now(self) -> Frame:
+        """Return what the kernels of a step work on; another struct where arrays were replaced."""
+        model, stepper, path = self.model, self.global_stepper, self.incision.path
+        interaction, contact, geoms = model.interaction, model.contact, model.geoms
+        parts = (
+            *(model.body, model.visits, model.stages, model.elasticity.arrays),
+            *(model.supports, model.attachments, model.loose, model.damping),
+            *(interaction.state, interaction.grid, interaction.latest_report, path),
+            *(contact.search, contact.forces, geoms.arrays, geoms.search, geoms.faces),
+            stepper.choice,
+        )
+        if self._frame is None or not all(map(is_, parts, self._parts)):
+            where = path, self._bounds, self._slit_reach
+            blade = interaction.context(model.body, model.visits, *where)
+            self._frame = Frame(
+                n_increments=1,
+                travel=0.0,
+                relaxation=stepper.arrays(model, blade),
+                geom_search=geoms.search,
+                geom_faces=geoms.faces,
+                node_size=float(model.node_size),
+            )
+            self._parts = (*parts[:-1], stepper.choice)
+        return self._frame
 
     # between steps
 
@@ -275,7 +343,7 @@ class StepStages:
         else:
             warn_of_motion(model, found.n_steps, found.accelerations, support, SETTLED)
         write_bounds(model.body, self._bounds)
-        self.audit.begin(model, NOWHERE)
+        self.audit.begin(self.context, NOWHERE)
         return found.n_steps
 
     def take_edge(self, edge: Edge | None) -> None:
@@ -303,23 +371,22 @@ class StepStages:
         return self.model.body, self.model.visits
 
     def _before_cut(self) -> None:
-        self.audit.before_cut(self.model, *self.model.interaction.edge_now)
+        self.audit.before_cut(self.context, *self.model.interaction.edge_now)
 
     def _after_pass(self) -> None:
         """Update what depends on the tetrahedra that changed, and make room for another pass."""
         model, change = self.model, self.incision.scheme.change
         if change.n_dirty == 0 and not change.is_full:
             return
-        n = touched_nodes(model.body, change, model.visits, model.touched)
+        n = _TOUCHED.call(model.body, change, model.visits, model.touched)
         if n:
             changed = ChangedMesh(model.body, model.visits, change, model.touched[:n])
             for owner in self.owners:
                 owner.mesh_changed(changed)
-            model.renew_context()
         self.make_room()
 
     def _after_cut(self) -> None:
-        self.audit.after_cut(self.model, *self.model.interaction.edge_now)
+        self.audit.after_cut(self.context, *self.model.interaction.edge_now)
 
     def make_room(self) -> None:
         """Make room for the next pass of a cut: arrays double when they are nearly full."""
@@ -327,7 +394,6 @@ class StepStages:
         if room is not None:
             for owner in self.owners:
                 owner.grow(*room)
-            self.model.renew_context()
 
     def make_more_room(self, lacking: int) -> None:
         """Make twice the room for what lacked it in a cut; see `NoRoomError`."""

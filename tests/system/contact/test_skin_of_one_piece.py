@@ -51,4 +51,4 @@ def test_edges_of_one_piece_are_not_tested_against_each_other():
     tissue, _ = fallen(0.012, SolverSettings())
     contact = tissue._model.contact
     assert contact.forces.n_pressing > 5
-    assert contact._search.edge_pairs.n_pairs == 0
+    assert contact.search.edge_pairs.n_pairs == 0

@@ -10,7 +10,7 @@ from tissue import Material, Tissue, block
 
 def wake_all(tissue: Tissue) -> None:
     """Make the next search test all nodes and all pairs of edges."""
-    search = tissue._model.contact._search
+    search = tissue._model.contact.search
     search.all_resting_until = search.edge_pairs.resting_until = -np.inf
     search.resting_until[:] = -np.inf
 

@@ -67,7 +67,7 @@ def test_a_grid_that_is_built_anew_in_every_step_changes_nothing(blade):
     expected = fingerprint(usual, strokes.make(usual, stroke))
     results = []
     for sweep in strokes.sweeps(stroke):
-        other._model.interaction._grid = no_grid()
+        other._model.interaction.grid = no_grid()
         results.append(other.step(sweep, strokes.DT))
     assert fingerprint(other, results) == expected
 

@@ -133,6 +133,12 @@ def _with_skin(faces: Faces, body: Body) -> Faces:
 
 
 @kernel
+def has_room_for_changed(faces: Faces, change: Change) -> bool:
+    """Return whether there is room for the faces of the tetrahedra that changed, 4 for each."""
+    return bool(faces.n_places + 4 * change.n_dirty <= len(faces.face))
+
+
+@kernel
 def update_changed_faces(faces: Faces, body: Body, change: Change) -> None:
     """Add and remove faces of the tetrahedra that changed. Room: 4 for each of them."""
     for i in range(change.n_dirty):

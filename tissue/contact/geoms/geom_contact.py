@@ -26,7 +26,6 @@ from tissue.contact.geoms.geom_arrays import (
     Geoms,
     GeomSearch,
     grown_geom_contacts,
-    largest_motion,
     lead_geoms,
     new_geom_contacts,
     new_geoms,
@@ -64,6 +63,8 @@ for 1 ms. It is a tenth of a second of wall time for a small body, and 15 times 
 step goes wrong and is repeated. More is taken for a mistake, which would keep a process for long.
 With 10,000 a geom that was put 7 m elsewhere kept a server for 15 s."""
 
+_UPDATE_FACES = SameTypes(update_changed_faces)
+
 
 class GeomContact:
     """Contact of a body with rigid geoms, which are moved from outside between steps.
@@ -97,9 +98,10 @@ class GeomContact:
         n_nodes, all_geoms = len(body.rest), new_geoms(list(self.geoms))
         self.arrays: GeomContacts = new_geom_contacts(all_geoms, CONTACTS_AT_FIRST, n_nodes)
         """Arrays of the contacts; others where they grow."""
-        self._faces: Faces = with_skin(new_faces(len(body.tetrahedra)), body)
+        self.faces: Faces = with_skin(new_faces(len(body.tetrahedra)), body)
+        """Skin and lips; other arrays where they grow."""
         of_nodes = ("near", "near_at", "listed")
-        self._search = GeomSearch(
+        self.search = GeomSearch(
             stamp=0,
             search=0,
             is_first=1,
@@ -113,14 +115,17 @@ class GeomContact:
             moved=0.0,
             covered=0.0,
             fastest=0.0,
-            touched=np.zeros(len(self._faces.face), np.int64),
+            touched=np.zeros(len(self.faces.face), np.int64),
             normal=np.zeros((n_nodes, 3)),
             node_size=float(node_size),
             **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
         )
-        self._find, self._lead = SameTypes(find_geom_contacts), SameTypes(lead_geoms)
-        self._sum, self._largest_motion = SameTypes(sum_wrenches), SameTypes(largest_motion)
-        self._seconds = 0.0
+        """Scratch of the search; another struct where its arrays grow."""
+        self._lead, self._sum = SameTypes(lead_geoms), SameTypes(sum_wrenches)
+        self.seconds = 0.0
+        """Length of the last time step [s]."""
+        self.are_led = False
+        """Whether geoms were led to poses for the next step, or in the last one."""
         n = len(self.geoms)
         self._origins = np.zeros((n, 3))
         self._rotations = np.tile(np.eye(3), (n, 1, 1))
@@ -178,11 +183,13 @@ class GeomContact:
                 }[fault]
             )
         self._origins, self._rotations = places, axes
+        self.are_led = True
 
     def stop(self) -> None:
         """Place every geom where the next step would end."""
-        if not self.geoms:
+        if not self.are_led:
             return
+        self.are_led = False
         arrays = self.arrays.geoms
         arrays.origin_t0[:] = self._origins
         arrays.axes_t0[:] = self._rotations.reshape(-1, 9)
@@ -206,29 +213,25 @@ class GeomContact:
         flags = self.arrays.geoms.is_near
         if (flags != are_near).any():
             flags[:] = are_near
-            self._search.is_due = 1
+            self.search.is_due = 1
 
     @property
     def act(self) -> bool:
         """Whether any node is near a geom."""
         return bool(self.geoms) and self.arrays.n_contacts > 0
 
-    @property
-    def n_increments(self) -> int:
-        """Number of increments of the next step, so that no geom passes unseen."""
-        if not self.geoms:
-            return 1
-        largest = self._largest_motion.call(self.arrays.geoms)
-        return max(1, math.ceil(largest / FARTHEST_IN_A_SUBSTEP))
-
     def begin_step(self, body: Body, dt: float) -> None:
         """Find the contacts of a step of that length [s]."""
-        self._seconds = dt
+        self.seconds = dt
         if not self.geoms:
             return
-        while self._find.call(self._search, self.arrays, self._faces, body, dt) == LIST_IS_FULL:
-            # Twice the room: the arrays have two lists.
-            self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom), len(body.rest))
+        while find_geom_contacts(self.search, self.arrays, self.faces, body, dt) == LIST_IS_FULL:
+            self.make_room(body)
+
+    def make_room(self, body: Body) -> None:
+        """Make twice the room for contacts."""
+        # The arrays have two lists.
+        self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom), len(body.rest))
 
     def wrenches(self) -> tuple[FloatArray, FloatArray]:
         """Return forces and torques of the tissue on the geoms, averaged over the last step.
@@ -238,7 +241,7 @@ class GeomContact:
             shape (n, 3), in the tissue's frame.
         """
         forces, torques = np.zeros((2, len(self.geoms), 3))
-        per_second = 1.0 / self._seconds if self._seconds > 0.0 else 0.0
+        per_second = 1.0 / self.seconds if self.seconds > 0.0 else 0.0
         self._sum.call(self.arrays, self._origins, per_second, forces, torques)
         return forces, torques
 
@@ -251,7 +254,7 @@ class GeomContact:
         """Return where tissue touched geoms in the last step, and with which forces."""
         rows = self._rows()
         rows = rows[self.arrays.impulse[rows].any(axis=1)]
-        arrays, seconds = self.arrays, self._seconds or math.inf
+        arrays, seconds = self.arrays, self.seconds or math.inf
         return GeomForces(
             arrays.geom[rows],
             arrays.point[rows],
@@ -269,22 +272,22 @@ class GeomContact:
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Take the faces that a pass of a cut made."""
         if self.geoms:
-            self._faces = with_room(self._faces, 4 * changed.change.n_dirty)
-            update_changed_faces(self._faces, changed.body, changed.change)
-            self._search.is_due = 1
-            n_faces = len(self._faces.face)
-            if len(self._search.touched) < n_faces:
-                self._search = self._search.replaced(touched=np.zeros(n_faces, np.int64))
+            self.faces = with_room(self.faces, 4 * changed.change.n_dirty)
+            _UPDATE_FACES.call(self.faces, changed.body, changed.change)
+            self.search.is_due = 1
+            n_faces = len(self.faces.face)
+            if len(self.search.touched) < n_faces:
+                self.search = self.search.replaced(touched=np.zeros(n_faces, np.int64))
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for a body of `n_nodes` and `n_tetrahedra`."""
-        search = self._search
+        search = self.search
         of_nodes = {
             name: grown(getattr(search, name), n_nodes)
             for name in ("near", "near_at", "listed", "normal")
         }
-        self._search = search.replaced(**of_nodes)
-        self._faces = grown_faces(self._faces, n_tetrahedra)
+        self.search = search.replaced(**of_nodes)
+        self.faces = grown_faces(self.faces, n_tetrahedra)
         self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom) // 2, n_nodes)
 
     def _rows(self) -> IntArray:
@@ -297,7 +300,7 @@ class GeomContact:
         Raises:
             ValueError: a node is deeper in one than `DEEPEST_AT_FIRST`.
         """
-        most = DEEPEST_AT_FIRST * self._search.node_size
+        most = DEEPEST_AT_FIRST * self.search.node_size
         for g, geom in enumerate(self.geoms):
             node, depth = _deepest_node(self.arrays.geoms, g, body)
             if depth > most:

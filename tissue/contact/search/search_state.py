@@ -42,6 +42,18 @@ class SearchState(Arrays):
     """Number of searches since normals were computed."""
     n_due: IntCell
     """Number of nodes whose contacts are sought in this search."""
+    acts: IntCell
+    """1 if there is contact, else 0: then nothing ever touches."""
+    is_awake: IntCell
+    """1 once anything could touch, else 0."""
+    is_tested: IntCell
+    """1 if that was tested in this time step, else 0."""
+    is_searched: IntCell
+    """1 if contacts were searched in this time step, and no cut came since, else 0."""
+    has_touched: IntCell
+    """1 if there were contacts in this time step, else 0."""
+    n_found: IntCell
+    """Number of contacts after the last search; some are kept ready."""
     all_resting_until: FloatCell
     """Value of `NodeMotion.quiet_path` up to which no node needs a test while no node moves much
     [m]."""

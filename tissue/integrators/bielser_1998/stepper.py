@@ -17,6 +17,7 @@ from tissue.integrators.bielser_1998.kernels import (
     ring_frequencies,
 )
 from tissue.integrators.bielser_1998.rings import find_held, find_rings, grown_rings, new_rings
+from tissue.integrators.driver import Relaxation
 from tissue.integrators.integrator import not_finite
 from tissue.integrators.methods import SAFETY, Hierarchical
 from tissue.integrators.model import TissueModel
@@ -64,10 +65,10 @@ class HierarchicalStepper:
         return self._options.far == "frozen"
 
     def relax(
-        self, system: TissueModel, blade: BladeContext, increment: Increment, has_blade: bool
+        self, system: TissueModel, arrays: Relaxation, increment: Increment, has_blade: bool
     ) -> int:
         """Relax by an increment, stage by stage; return how many steps the focus took."""
-        return relax_in_stages(self, system, blade, increment, has_blade)
+        return relax_in_stages(self, system, arrays.blade, increment, has_blade)
 
     def advance(self, system: TissueModel, increment: Increment) -> int:
         """Advance the motion by one frame; return how many steps the nodes of the focus took."""
@@ -162,18 +163,16 @@ def relax_in_stages(
     interaction, edge = system.interaction, increment.edge
     faces_of = edge if has_blade else None
     interaction.update_faces(blade, integrator.moved, faces_of, increment.begin)
-    system.renew_context()
     n = integrator.advance(system, increment) if increment.span > 0.0 else 0
     if n > 0:
         system.relax_stress(increment.span)
-        if integrator.moving is None:
+        if integrator.moving is None and system.increments_to_pieces > 0:
             system.find_new_loose_pieces()
         if not _update_bounds(integrator, system, blade):
             raise not_finite()
     if has_blade:
         external, blade = system.stages.external, interaction.renewed(blade)
         interaction.update_anchors(blade, external, integrator.moved, edge, increment.end)
-        system.renew_context()
     return n
 
 

@@ -57,6 +57,6 @@ def test_a_list_lasts_until_nodes_have_come_nearer_by_a_tenth_of_a_node_size():
     body.velocities[:, 2] = 0.05
     for _ in range(24):
         contact.begin_step(body, 1e-3)
-        searches.append(contact._search.search)
+        searches.append(contact.search.search)
     # 0.05 mm a step, of which the first is covered: another search each ten or eleven steps.
     assert 2 <= searches[-1] - searches[0] <= 3

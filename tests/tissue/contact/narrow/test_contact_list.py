@@ -24,7 +24,7 @@ def test_no_two_contacts_of_a_node_are_in_one_direction(seed):
     random, most = np.random.default_rng(seed), 0
     body.positions[: len(is_upper)] += random.normal(scale=1e-3, size=(len(is_upper), 3))
     contact = searched(body)
-    forces, search = contact.forces, contact._search
+    forces, search = contact.forces, contact.search
     for node in search.pairs.nodes[: search.pairs.n_nodes]:
         normals = forces.normal[search.contact[node] :][: search.n_contacts[node]]
         assert len(normals) <= 3
@@ -39,7 +39,7 @@ def test_contacts_of_nodes_that_do_not_move_go_on_as_they_are_in_another_list():
     contact = searched(body)
     forces, n = contact.forces, contact.forces.n_contacts
     before = {name: getattr(forces, name)[rows_of(contact)].copy() for name in CARRIED}
-    contact._search.is_listing_due, first = 1, forces.first
+    contact.search.is_listing_due, first = 1, forces.first
     search_again(contact, body)
     assert (forces.n_contacts, forces.first == first) == (n, False)
     for name, values in before.items():

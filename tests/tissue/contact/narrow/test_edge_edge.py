@@ -37,7 +37,7 @@ def test_pairs_that_touch_are_kept_and_the_others_have_their_slack(make):
     n_touching, n_left_out = 0, 0
     for _ in range(100):
         tissue.step(None, strokes.DT)
-        search = contact._search
+        search = contact.search
         is_kept, slack = kept(search, body)
         for k in range(search.edge_pairs.n_pairs):
             touch = edge_touch_of(search, body, k)

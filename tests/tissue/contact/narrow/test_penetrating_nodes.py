@@ -24,7 +24,7 @@ def test_nodes_in_tetrahedra_of_another_part_are_found(seed):
     wanted = set().union(*(inside(body, t) for t in range(body.n_tetrahedra)))
     has_contact = set(map(int, contact.forces.node[rows_of(contact), 0]))
     contact = searched(body, n=4)
-    pairs = contact._search.pairs
+    pairs = contact.search.pairs
     found = set(map(int, np.flatnonzero(pairs.is_penetrating)))
     assert found == wanted - has_contact
     assert found

@@ -1,0 +1,122 @@
+"""The begin of a time step in one call: checks, edge, contacts with geoms, number of increments.
+
+Each call from Python costs 1 to 4 us. Where the begin needs something, a call returns; the next one
+goes on behind it.
+"""
+
+import math
+from typing import Final
+
+from tissue.blade.edge import Edge, is_other_length
+from tissue.blade.forces import begin_blade_step
+from tissue.contact.geometry.faces import Faces
+from tissue.contact.geoms.contact_search import LIST_IS_FULL, find_geom_contacts
+from tissue.contact.geoms.geom_arrays import GeomSearch, largest_motion
+from tissue.contact.geoms.geom_contact import FARTHEST_IN_A_SUBSTEP
+from tissue.contact.search_stages import added_frequency, begin_contacts
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.core.vec3 import norm, sub
+from tissue.cutting.incision import INCREMENT, MOST_EDGE_INCREMENTS
+from tissue.integrators.driver import Relaxation
+from tissue.integrators.step_size import surely_takes_few_steps
+from tissue.mesh.node_motion import is_motion_finite
+
+BEGUN: Final = 0
+"""The time step has begun."""
+NOT_FINITE_BEFORE: Final = 1
+"""A position or a velocity is not a finite number; nothing was changed."""
+MANY_STEPS: Final = 2
+"""It may take too many steps of the integrator."""
+TOO_FAR: Final = 3
+"""The edge moves too far."""
+OTHER_EDGE: Final = 4
+"""The edge has another length than the one that holds the tissue."""
+UNSOUND_EDGE: Final = 5
+"""No blade can move so, as far as the squares of its numbers are finite."""
+GEOMS_LACK_ROOM: Final = 6
+"""The list of contacts with geoms is full."""
+
+
+class Frame(Arrays, two_precisions=True):
+    """Everything that the kernels of a time step read and write."""
+
+    n_increments: IntCell
+    """Number of increments of the time step."""
+    travel: FloatCell
+    """Distance that the edge moves in the time step [m]."""
+    relaxation: Relaxation
+    """What the relaxation of an increment works on."""
+    geom_search: GeomSearch
+    """What the search for contacts with geoms works on."""
+    geom_faces: Faces
+    """Skin and lips, which may touch geoms."""
+    node_size: float
+    """Mean node size [m]."""
+
+
+@kernel
+def begin_frame(
+    frame: Frame,
+    edge: Edge,
+    has_blade: bool,
+    dt: float,
+    edge_length: float,
+    held: float,
+    after: int,
+) -> int:
+    """Begin a time step; return BEGUN, or what is wrong or needed.
+
+    Args:
+        frame: Written.
+        edge: The cutting edge over the time step.
+        has_blade: Whether there is one.
+        dt: Length of the time step [s].
+        edge_length: Length of the edge that holds the tissue [m]; 0 for none.
+        held: Largest part of attachments in w^2 of the body [1/s2].
+        after: What the last call of this step returned, and was settled; at first BEGUN.
+    """
+    step = frame.relaxation.step
+    if after < NOT_FINITE_BEFORE and not is_motion_finite(step.body):
+        return NOT_FINITE_BEFORE
+    if after < MANY_STEPS:
+        search, limits = frame.relaxation.contacts, frame.relaxation.limits
+        squared = step.elastic.highest + held + added_frequency(search, limits)
+        if not surely_takes_few_steps(frame.relaxation.choice, step, squared, dt):
+            return MANY_STEPS
+    if after < TOO_FAR and not _divides_travel(frame, edge, has_blade):
+        return TOO_FAR
+    length = norm(sub(edge.tip_t1, edge.heel_t1)) if has_blade else 0.0
+    if after < OTHER_EDGE and is_other_length(length, edge_length):
+        return OTHER_EDGE
+    if after < GEOMS_LACK_ROOM:
+        is_checked = not has_blade or after == UNSOUND_EDGE
+        if not begin_blade_step(step.blade, step.body, edge, dt, is_checked):
+            return UNSOUND_EDGE
+        begin_contacts(frame.relaxation.contacts, step.contacts)
+    if len(step.geoms.geoms.shape) > 0:
+        search_of_geoms, faces = frame.geom_search, frame.geom_faces
+        if find_geom_contacts(search_of_geoms, step.geoms, faces, step.body, dt) == LIST_IS_FULL:
+            return GEOMS_LACK_ROOM
+        largest = largest_motion(step.geoms.geoms) / FARTHEST_IN_A_SUBSTEP
+        frame.n_increments = max(frame.n_increments, math.ceil(largest))
+    return BEGUN
+
+
+@kernel
+def _divides_travel(frame: Frame, edge: Edge, has_blade: bool) -> bool:
+    """Write into how many increments the travel of the edge divides the step; False: too many.
+
+    It is 1 for a path that is not finite: a blade on it is refused.
+    """
+    frame.n_increments, frame.travel = 1, 0.0
+    if has_blade:
+        tip = norm(sub(edge.tip_t1, edge.tip_t0))
+        frame.travel = max(tip, norm(sub(edge.heel_t1, edge.heel_t0)))
+    n = frame.travel / (INCREMENT * frame.node_size)
+    if not math.isfinite(n):
+        return True
+    if n > MOST_EDGE_INCREMENTS:
+        return False
+    frame.n_increments = max(1, math.ceil(n))
+    return True
