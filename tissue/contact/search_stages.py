@@ -101,7 +101,18 @@ def prepare_contacts(
 ) -> int:
     """Find the contacts of a time step, unless this was done since it began.
 
-    The arguments, and what is returned, are those of `search_contacts`; or NEEDS_SKIN.
+    Args:
+        search: Written.
+        forces: The contacts; written.
+        limits: Limits of their stiffness; written.
+        body: Where the nodes are.
+        frequency_squared: Bound on w^2 of each node without contact [1/s2].
+        highest: Bound on w^2 of the body without contact [1/s2].
+        room: What may be added to that without another step [1/s2].
+        seconds: Length of the time step [s].
+
+    Returns:
+        DONE, or what needs room, to call again.
     """
     if search.is_searched == 1:
         return DONE

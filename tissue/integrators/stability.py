@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from tissue.core.jit import kernel
+from tissue.core.limits import MOST_SUBSTEPS
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.integrators.methods import METHODS, RUNGE_KUTTA, SAFETY
 from tissue.laws.kernels import stiffens
@@ -40,6 +41,28 @@ _RATIOS: Final = tuple(STABILITY_LIMIT[:, 0].tolist())
 _LAST_LIMIT: Final = float(STABILITY_LIMIT[-1, 1])
 _INVERSES: Final = tuple((1.0 / STABILITY_LIMIT[:, 1]).tolist())
 """The limit falls nearly as 1 / ratio: a line between its entries would be above it."""
+
+
+_SURELY_FEW = 0.1
+"""Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
+longest step need not be computed. It takes some 1.3 steps at most for each of them, by
+`STABILITY_LIMIT`."""
+
+
+@kernel
+def surely_takes_few_steps(
+    elastic: Elastic, surroundings: Surroundings, squared: float, dt: float
+) -> bool:
+    """Return whether a time step surely takes few steps of the integrator.
+
+    Args:
+        elastic: What the forces inside the body follow from.
+        surroundings: All damping.
+        squared: Bound on w^2 of the body with all that holds and touches it [1/s2].
+        dt: Length of the time step [s].
+    """
+    rate = surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag
+    return bool(dt * (math.sqrt(squared) + rate) <= _SURELY_FEW * MOST_SUBSTEPS)
 
 
 @kernel

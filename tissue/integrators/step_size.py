@@ -11,7 +11,6 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.limits import MOST_SUBSTEPS
 from tissue.core.simd import point, store_point, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.elasticity.finite_elements import Solid
@@ -75,11 +74,6 @@ it can be done."""
 
 _GRADIENTS: Final = tuple(method.gradients for method in METHODS.values())
 _FOLLOWS_SLIVERS: Final = tuple(method.follows_slivers for method in METHODS.values())
-
-_SURELY_FEW = 0.1
-"""Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
-longest step need not be computed. It takes some 1.3 steps at most for each of them, by
-`tissue.integrators.stability.STABILITY_LIMIT`."""
 
 _ROUNDING = 1e-9
 """Share by which a frequency stays below that which would take another step."""
@@ -174,23 +168,6 @@ def new_step_choice(
         surroundings=surroundings,
         no_frequency=np.zeros(n_nodes),
     )
-
-
-@kernel
-def surely_takes_few_steps(
-    choice: StepChoice, context: StepContext, squared: float, dt: float
-) -> bool:
-    """Return whether a time step surely takes few steps of the integrator.
-
-    Args:
-        choice: All damping.
-        context: The body.
-        squared: Bound on w^2 of the body with all that holds and touches it [1/s2].
-        dt: Length of the time step [s].
-    """
-    around = choice.surroundings
-    rate = around.retardation_time * context.elastic.highest_of_dampers + around.drag
-    return bool(dt * (math.sqrt(squared) + rate) <= _SURELY_FEW * MOST_SUBSTEPS)
 
 
 @kernel

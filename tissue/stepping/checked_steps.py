@@ -7,6 +7,7 @@ and stops.
 """
 
 import logging
+import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -22,7 +23,7 @@ from tissue.mesh.body import Body
 from tissue.mesh.node_motion import is_motion_finite
 from tissue.state.tissue_state import RULES
 from tissue.stepping.judgement import StepWatch
-from tissue.stepping.stages import NOT_FINITE, StepStages
+from tissue.stepping.stages import FAULT_BEFORE, StepStages
 from tissue.types import StepResult, TissueError
 
 MOST_REPEATS = 3
@@ -72,9 +73,9 @@ class CheckedSteps:
         stages, watch = self._stages, self.watch
         if self._is_changed:
             if not is_motion_finite(stages.model.body):
-                raise self._stop(NOT_FINITE, _worst_nodes(stages.model.body), is_repeated=False)
+                raise self._stop(FAULT_BEFORE, _worst_nodes(stages.model.body), is_repeated=False)
             self.save()
-        inputs = stages.handles.inputs(sweep, dt)
+        inputs = stages.handles.inputs(sweep, _checked_time_step(dt))
         if inputs.supports is not None:  # nodes may have got other velocities
             watch.look(stages.context)
         result, fault = self._try(inputs)
@@ -146,7 +147,7 @@ class CheckedSteps:
         energies = result.energies
         residual = 0.0 if energies is None else energies.residual
         amounts = (stages.audit.work_of_loads, residual, sum(result.wrench.numbers))
-        fault = self.watch.fault(stages.context, float(inputs.dt), *amounts)
+        fault = self.watch.fault(stages.context, inputs.dt, *amounts)
         return (result, "") if fault is None else (None, fault)
 
     def _repeat(self, inputs: StepInputs, fault: str) -> StepResult:
@@ -231,3 +232,14 @@ def _worst_nodes(body: Body) -> IntArray:
     sizes[np.isnan(sizes)] = np.inf
     found: IntArray = np.argsort(-sizes, kind="stable")[:NODES_NAMED]
     return found
+
+
+def _checked_time_step(dt: float) -> float:
+    """Return a time step [s] as a float: kernels that are called with one take no other number.
+
+    Raises:
+        ValueError: it is not finite, or negative.
+    """
+    if not (math.isfinite(dt) and dt >= 0.0):
+        raise ValueError(f"dt is {dt} s; it must be finite and not negative")
+    return float(dt)

@@ -19,7 +19,7 @@ from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import norm, sub
 from tissue.cutting.incision import INCREMENT, MOST_EDGE_INCREMENTS
 from tissue.integrators.driver import Relaxation
-from tissue.integrators.step_size import surely_takes_few_steps
+from tissue.integrators.stability import surely_takes_few_steps
 from tissue.mesh.node_motion import is_motion_finite
 
 BEGUN: Final = 0
@@ -38,7 +38,7 @@ GEOMS_LACK_ROOM: Final = 6
 """The list of contacts with geoms is full."""
 
 
-class Frame(Arrays, two_precisions=True):
+class FrameContext(Arrays, two_precisions=True):
     """Everything that the kernels of a time step read and write."""
 
     n_increments: IntCell
@@ -57,7 +57,7 @@ class Frame(Arrays, two_precisions=True):
 
 @kernel
 def begin_frame(
-    frame: Frame,
+    frame: FrameContext,
     edge: Edge,
     has_blade: bool,
     dt: float,
@@ -82,7 +82,8 @@ def begin_frame(
     if after < MANY_STEPS:
         search, limits = frame.relaxation.contacts, frame.relaxation.limits
         squared = step.elastic.highest + held + added_frequency(search, limits)
-        if not surely_takes_few_steps(frame.relaxation.choice, step, squared, dt):
+        around = frame.relaxation.choice.surroundings
+        if not surely_takes_few_steps(step.elastic, around, squared, dt):
             return MANY_STEPS
     if after < TOO_FAR and not _divides_travel(frame, edge, has_blade):
         return TOO_FAR
@@ -104,7 +105,7 @@ def begin_frame(
 
 
 @kernel
-def _divides_travel(frame: Frame, edge: Edge, has_blade: bool) -> bool:
+def _divides_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
     """Write into how many increments the travel of the edge divides the step; False: too many.
 
     It is 1 for a path that is not finite: a blade on it is refused.

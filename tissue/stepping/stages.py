@@ -1,6 +1,5 @@
 """`StepStages`: the stages of a time step, in the order in which `advance` lists them."""
 
-import math
 from operator import is_
 from time import perf_counter
 
@@ -40,14 +39,14 @@ from tissue.stepping.frame import (
     NOT_FINITE_BEFORE,
     OTHER_EDGE,
     TOO_FAR,
-    Frame,
+    FrameContext,
     begin_frame,
 )
 from tissue.types import Chunks, StageTimes, StepResult
 
 _TOUCHED = SameTypes(touched_nodes)
 
-NOT_FINITE = "a number of its state was not finite before the step"
+FAULT_BEFORE = "a number of its state was not finite before the step"
 
 
 class StepStages:
@@ -85,7 +84,7 @@ class StepStages:
         self.chunks = BodyChunks()
         """Boxes that together hold the body."""
         self._slit_reach = slit_reach
-        self._frame: Frame | None = None
+        self._frame: FrameContext | None = None
         self._parts: tuple[object, ...] = ()
         self._begin_frame, self._trace = SameTypes(begin_frame), SameTypes(trace)
         self._bounds = bounds_of_body(model.body)
@@ -122,7 +121,6 @@ class StepStages:
         """
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
-        dt = _checked_time_step(dt)
         model, incision, handles = self.model, self.incision, self.handles
         begun = self._begin(sweep, edge, dt)
         n, travel = begun.n_increments * self.global_stepper.refinement, begun.travel
@@ -156,7 +154,7 @@ class StepStages:
         stage_times = StageTimes(collision, topology, relaxation)
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
-    def _begin(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> Frame:
+    def _begin(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> FrameContext:
         """Take the edge, start the totals of a step, and find where geoms may touch.
 
         Returns:
@@ -180,7 +178,7 @@ class StepStages:
         """Do what the begin of a step needs, or refuse the step; see `begin_frame`."""
         model = self.model
         if outcome == NOT_FINITE_BEFORE:
-            raise UnstableError(NOT_FINITE)
+            raise UnstableError(FAULT_BEFORE)
         if outcome == MANY_STEPS:
             expect_few_steps(model, self.global_stepper.method.number, dt)
         elif outcome == TOO_FAR:
@@ -260,7 +258,7 @@ class StepStages:
         """The body and all that acts on it, as the kernels of an integrator take it."""
         return self._frame_now().relaxation.step
 
-    def _frame_now(self) -> Frame:
+    def _frame_now(self) -> FrameContext:
         """Return what the kernels of a step work on; another struct where arrays were replaced."""
         model, stepper, path = self.model, self.global_stepper, self.incision.path
         interaction, contact, geoms = model.interaction, model.contact, model.geoms
@@ -274,7 +272,7 @@ class StepStages:
         if self._frame is None or not all(map(is_, parts, self._parts)):
             where = path, self._bounds, self._slit_reach
             blade = interaction.context(model.body, model.visits, *where)
-            self._frame = Frame(
+            self._frame = FrameContext(
                 n_increments=1,
                 travel=0.0,
                 relaxation=stepper.arrays(model, blade),
@@ -399,14 +397,3 @@ class StepStages:
         """Make twice the room for what lacked it in a cut; see `NoRoomError`."""
         self.incision.scheme.make_room(lacking)
         self.make_room()
-
-
-def _checked_time_step(dt: float) -> float:
-    """Return a time step [s] as a float: kernels that are called with one take no other number.
-
-    Raises:
-        ValueError: it is not finite, or negative.
-    """
-    if not (math.isfinite(dt) and dt >= 0.0):
-        raise ValueError(f"dt is {dt} s; it must be finite and not negative")
-    return float(dt)
