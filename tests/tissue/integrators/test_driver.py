@@ -6,7 +6,7 @@ from tests.support import bodies, strokes
 from tests.system.state.test_determinism import fingerprint
 from tissue import BladeShape, Material, SolverSettings, Tissue
 from tissue.integrators.bielser_1998.stepper import relax_in_stages
-from tissue.integrators.step_size import begin_increment, next_part
+from tissue.integrators.step_size import begin_increment, next_part, room_for_contact
 from tissue.mesh.tetrahedron_grid import no_grid
 
 MESH = bodies.jittered(4, 0)
@@ -35,12 +35,16 @@ class InStages:
     def __getattr__(self, name):
         return getattr(self._stepper, name)
 
-    def relax(self, system, blade, increment, has_blade):
-        return relax_in_stages(self, system, blade, increment, has_blade)
+    def relax(self, system, arrays, increment, has_blade):
+        return relax_in_stages(self, system, arrays.blade, increment, has_blade)
 
     def advance(self, system, increment):
-        stepper = self._stepper
-        choice = stepper._find_contacts(system, increment, stepper._choice_for(system))
+        stepper, contact, elastic = self._stepper, system.contact, system.elasticity.arrays
+        choice = stepper.choice
+        room = room_for_contact(choice, system.context, increment.span)
+        bounds = elastic.frequency_squared, elastic.highest, room
+        contact.prepare(system.body, *bounds, increment.span)
+        choice.of_contact = contact.added_frequency_squared
         begin_increment(choice, system.context, *increment[1:])
         while next_part(choice, system.context):
             part = increment._replace(begin=choice.begin, end=choice.part_end)
