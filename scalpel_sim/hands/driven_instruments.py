@@ -1,6 +1,6 @@
 """Blade and graspers as a person leads them, and records of where they were led."""
 
-from typing import Protocol
+import abc
 
 import mujoco
 import numpy as np
@@ -21,26 +21,58 @@ JAW_SPEED = 0.03
 9 mm in 0.3 s."""
 
 
-class LiveInstrument(Protocol):
-    """An instrument that a person leads when they have chosen it, and which rests else."""
+class LiveInstrument(abc.ABC):
+    """An instrument that a person leads when they have chosen it, and which rests else.
 
-    name: str
-    """What the page calls it."""
-    pose: LimitedPose
-    """Where it is, and where it is wanted."""
+    Its pose leads the hand to the same bits as a stroke with that pose in a row does.
+
+    Args:
+        name: What the page calls it.
+        hand: Holds the instrument already, at the start.
+        start: Its edge at first, tissue frame.
+        frame: Where the tissue lies in the world.
+        workspace: Lowest and highest place of the middle of the edge [m], shape (2, 3).
+        dt: Length of a frame [s].
+    """
+
+    def __init__(
+        self,
+        name: str,
+        hand: Hand,
+        start: BladeSegment,
+        frame: TissueFrame,
+        workspace: FloatArray,
+        dt: float,
+    ) -> None:
+        self.name = name
+        """What the page calls it."""
+        self._frame, self._dt = frame, dt
+        path = Stroke([0.0, 1.0], [start, start])
+        self._row = path.path[0]
+        self._follower = StrokeFollower(hand, path, frame)
+        self.half = float(self._row[2])
+        """Half the length of the edge [m]."""
+        # The edge is turned so: its +y is along it, and its -z cuts.
+        self.pose = LimitedPose(self._row[10:13], self._row[3:7], workspace, dt)
+        """Where it is, and where it is wanted."""
+        self._record = PoseRecord()
 
     @property
+    @abc.abstractmethod
     def is_closed(self) -> bool | None:
         """Whether its jaws are closed, or on their way there; None: it has none."""
 
     @property
+    @abc.abstractmethod
     def numbers(self) -> list[float]:
-        """Where it is led, tissue frame, and how far its jaws are open."""
+        """Where it is led, tissue frame, what of it is led first, and how far its jaws are open."""
 
     @property
     def tip(self) -> FloatArray:
         """What of it is led, in the world [m], shape (3,)."""
+        return self._frame.points_to_world(np.array(self.numbers[:3]))
 
+    @abc.abstractmethod
     def close_jaws(self, closed: bool) -> None:
         """Close or open its jaws, if it has any."""
 
@@ -52,16 +84,48 @@ class LiveInstrument(Protocol):
             is_engaged: Whether a person leads it.
             moves: Whether it goes on; else it rests where it is.
         """
+        if moves and self._record.has_begun:  # the record begins at the start
+            if self.pose.step():
+                axes = np.empty(9)
+                mujoco.mju_quat2Mat(axes, self.pose.rotation)
+                self._take_edge(self._edge_at(self.pose.middle, axes.reshape(3, 3).T))
+            self._move_jaws()
+        self._record.add(t, [*self.numbers, float(is_engaged)])
+
+    @abc.abstractmethod
+    def _edge_at(self, middle: FloatArray, axes: FloatArray) -> BladeSegment:
+        """Return the edge of the pose that leads, as it is read from the record, and keep the pose.
+
+        Args:
+            middle: The middle of the edge [m], shape (3,).
+            axes: Directions across it, along it and back from it, shape (3, 3).
+        """
+
+    def _take_edge(self, edge: BladeSegment) -> None:
+        """Lead to an edge of the same length."""
+        tip, heel, forward = (part[None] for part in edge)
+        middles, rotations, _ = poses_of_edges(tip, heel, forward)
+        self._row[3:7], self._row[10:13] = rotations[0], middles[0]
+
+    @abc.abstractmethod
+    def _move_jaws(self) -> None:
+        """Move its jaws by one frame, if it has any."""
+
+    def lead(self, t: float) -> None:
+        """Lead it to its pose at time `t` [s], a step after the last one."""
+        self._follower.lead(t)
 
     def finish(self, t: float) -> None:
         """End its record at time `t` [s]."""
+        self._record.finish(t)
 
     def take_rows(self) -> list[list[float]]:
         """Return the rows that were recorded since the last call."""
+        return self._record.take_rows()
 
 
-class LiveBlade:
-    """See `LiveInstrument`. Its rows are those of `LED_COLUMNS`.
+class LiveBlade(LiveInstrument):
+    """A blade that a person leads. Its rows are those of `LED_COLUMNS`.
 
     Args:
         hand: Holds the blade already, at the start.
@@ -81,56 +145,31 @@ class LiveBlade:
         workspace: FloatArray,
         dt: float,
     ) -> None:
-        self.name = BLADE
-        self._frame = frame
-        self._path = RestingPath(hand, start, frame)
-        self.half = self._path.half
-        """Half the length of the edge [m]."""
-        self.pose = LimitedPose(self._path.middle, self._path.rotation, workspace, dt)
-        self.numbers = [float(number) for part in start for number in part]
-        """Tip, heel and forward of the pose that leads, tissue frame."""
-        self._record = PoseRecord()
+        super().__init__(BLADE, hand, start, frame, workspace, dt)
+        self._numbers = [float(number) for part in start for number in part]
 
     @property
-    def tip(self) -> FloatArray:
-        """Where the tip is led [m], world frame, shape (3,)."""
-        return self._frame.points_to_world(np.array(self.numbers[:3]))
+    def numbers(self) -> list[float]:
+        """Tip, heel and forward of the pose that leads, tissue frame."""
+        return self._numbers
 
     def close_jaws(self, closed: bool) -> None:
-        """It has none."""
+        """Do nothing: it has none."""
 
-    def advance(self, t: float, *, is_engaged: bool, moves: bool) -> None:
-        """See `LiveInstrument.advance`."""
-        # The record begins at the start.
-        if moves and self._record.has_begun and self.pose.step():
-            self._take_pose()
-        self._record.add(t, [*self.numbers, float(is_engaged)])
+    def _move_jaws(self) -> None:
+        """Do nothing: it has none."""
 
-    def lead(self, t: float) -> None:
-        """Lead the blade to its pose at time `t` [s], a step after the last one."""
-        self._path.lead(t)
-
-    def finish(self, t: float) -> None:
-        """See `LiveInstrument.finish`."""
-        self._record.finish(t)
-
-    def take_rows(self) -> list[list[float]]:
-        """See `LiveInstrument.take_rows`."""
-        return self._record.take_rows()
-
-    def _take_pose(self) -> None:
-        """Lead by the pose as a `Stroke` reads it from the record: that rounds it once more."""
-        axes = np.empty(9)
-        mujoco.mju_quat2Mat(axes, self.pose.rotation)
-        _, along, back = axes.reshape(3, 3).T
-        middle, to_tip = self.pose.middle, self.half * along
-        pose = BladeSegment(middle + to_tip, middle - to_tip, -back)
-        self.numbers = [number for part in pose for number in part.tolist()]
-        self._path.take(pose)
+    def _edge_at(self, middle: FloatArray, axes: FloatArray) -> BladeSegment:
+        """See `LiveInstrument._edge_at`: a `Stroke` rounds the pose once more."""
+        _, along, back = axes
+        to_tip = self.half * along
+        edge = BladeSegment(middle + to_tip, middle - to_tip, -back)
+        self._numbers = [number for part in edge for number in part.tolist()]
+        return edge
 
 
-class LiveGrasper:
-    """See `LiveInstrument`. Its rows are those of `GRASP_COLUMNS`.
+class LiveGrasper(LiveInstrument):
+    """A grasper that a person leads. Its rows are those of `GRASP_COLUMNS`.
 
     Its jaws close and open as far as they do in a motion. Where they only rest there, they close
     and open as far as they can.
@@ -151,16 +190,12 @@ class LiveGrasper:
         workspace: FloatArray,
         dt: float,
     ) -> None:
-        self.name = motion.name
-        self._grasper, self._frame, self._dt = grasper, frame, dt
+        edge = _edge_of(motion.start, motion.name)
+        super().__init__(motion.name, grasper.hand, edge, frame, workspace, dt)
+        self._grasper, self._at = grasper, motion.start
         has_moved_jaws = motion.pads[0] < motion.pads[1]
         self._closed, self._open = motion.pads if has_moved_jaws else (0.0, WIDEST_OPENING)
-        start = motion.start
-        self._path = RestingPath(grasper.hand, self._edge(start), frame)
-        self.pose = LimitedPose(self._path.middle, self._path.rotation, workspace, dt)
-        self._at = start
-        self._wanted_opening = start.opening
-        self._record = PoseRecord()
+        self._wanted_opening = motion.start.opening
 
     @property
     def is_closed(self) -> bool:
@@ -172,49 +207,20 @@ class LiveGrasper:
         """Place, approach, across and opening, tissue frame."""
         return [*(float(number) for part in self._at[1:4] for number in part), self._at.opening]
 
-    @property
-    def tip(self) -> FloatArray:
-        """Where the middle between the pads is led [m], world frame, shape (3,)."""
-        return self._frame.points_to_world(np.array(self._at.at))
-
     def close_jaws(self, closed: bool) -> None:
         """Close or open the jaws."""
         self._wanted_opening = self._closed if closed else self._open
 
-    def advance(self, t: float, *, is_engaged: bool, moves: bool) -> None:
-        """See `LiveInstrument.advance`."""
-        if moves and self._record.has_begun:
-            if self.pose.step():
-                self._take_pose()
-            self._move_jaws()
-        self._record.add(t, [*self.numbers, float(is_engaged)])
-
     def lead(self, t: float) -> None:
         """Lead it to its pose and opening at time `t` [s], a step after the last one."""
-        self._path.lead(t)
+        super().lead(t)
         self._grasper.open_to(self._at.opening)
 
-    def finish(self, t: float) -> None:
-        """See `LiveInstrument.finish`."""
-        self._record.finish(t)
-
-    def take_rows(self) -> list[list[float]]:
-        """See `LiveInstrument.take_rows`."""
-        return self._record.take_rows()
-
-    def _edge(self, at: Waypoint) -> BladeSegment:
-        return edge_of_grasper(at, HALF_PAD, HALF_PAD, self.name)
-
-    def _take_pose(self) -> None:
-        """Lead by the pose as a `GraspMotion` reads it from the record."""
-        axes = np.empty(9)
-        mujoco.mju_quat2Mat(axes, self.pose.rotation)
-        across, along, _ = axes.reshape(3, 3).T
-        at = self.pose.middle
-        self._at = self._at._replace(
-            at=at.tolist(), approach=along.tolist(), across=across.tolist()
-        )
-        self._path.take(self._edge(self._at))
+    def _edge_at(self, middle: FloatArray, axes: FloatArray) -> BladeSegment:
+        """See `LiveInstrument._edge_at`: a `GraspMotion` reads it so."""
+        across, along, _ = axes.tolist()
+        self._at = self._at._replace(at=middle.tolist(), approach=along, across=across)
+        return _edge_of(self._at, self.name)
 
     def _move_jaws(self) -> None:
         """Move the jaws by one frame towards the wanted opening."""
@@ -224,46 +230,9 @@ class LiveGrasper:
         self._at = self._at._replace(opening=float(to))
 
 
-class RestingPath:
-    """A path of one pose, and the hand that is led to it.
-
-    It leads the hand to the same bits as a stroke with that pose in a row does.
-
-    Args:
-        hand: Holds an instrument already, at the pose.
-        start: The first pose, tissue frame.
-        frame: Where the tissue lies in the world.
-    """
-
-    def __init__(self, hand: Hand, start: BladeSegment, frame: TissueFrame) -> None:
-        stroke = Stroke([0.0, 1.0], [start, start])
-        self._row = stroke.path[0]
-        self._follower = StrokeFollower(hand, stroke, frame)
-
-    @property
-    def half(self) -> float:
-        """Half the length of the edge [m]."""
-        return float(self._row[2])
-
-    @property
-    def middle(self) -> FloatArray:
-        """Where the middle of the edge is [m], shape (3,). A copy."""
-        return np.array(self._row[10:13])
-
-    @property
-    def rotation(self) -> FloatArray:
-        """How the edge is turned: its +y is along it, and its -z cuts (w, x, y, z). A copy."""
-        return np.array(self._row[3:7])
-
-    def take(self, pose: BladeSegment) -> None:
-        """Replace the pose by one of the same length."""
-        tip, heel, forward = (part[None] for part in pose)
-        middles, rotations, _ = poses_of_edges(tip, heel, forward)
-        self._row[3:7], self._row[10:13] = rotations[0], middles[0]
-
-    def lead(self, t: float) -> None:
-        """Lead the instrument to the pose at time `t` [s], a step after the last one."""
-        self._follower.lead(t)
+def _edge_of(at: Waypoint, name: str) -> BladeSegment:
+    """Return the edge between the pads of a grasper."""
+    return edge_of_grasper(at, HALF_PAD, HALF_PAD, name)
 
 
 class PoseRecord:
