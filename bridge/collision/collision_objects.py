@@ -72,12 +72,6 @@ def are_colliding(one: fcl.CollisionObject, other: fcl.CollisionObject) -> bool:
     return bool(fcl.collide(one, other, _ONE_CONTACT, fcl.CollisionResult()))
 
 
-def fixture_object(fixture: Fixture) -> tuple[fcl.CollisionGeometry, fcl.CollisionObject]:
-    """Return a new geometry for a fixture, and the object with its pose."""
-    geometry, pose = _geometry(fixture)
-    return geometry, fcl.CollisionObject(geometry, pose)
-
-
 def fixture_objects(
     fixtures: list[Fixture],
 ) -> dict[str, tuple[fcl.CollisionGeometry, fcl.CollisionObject]]:
@@ -90,11 +84,13 @@ def fixture_objects(
     for fixture in fixtures:
         if fixture.name in objects:
             raise ValueError(f"two fixtures have the name {fixture.name!r}")
-        objects[fixture.name] = fixture_object(fixture)
+        geometry, pose = _geometry(fixture)
+        objects[fixture.name] = geometry, fcl.CollisionObject(geometry, pose)
     return objects
 
 
 def _geometry(fixture: Fixture) -> tuple[fcl.CollisionGeometry, fcl.Transform]:
+    """Return a new geometry for a fixture, and its pose."""
     if isinstance(fixture, FixtureBox):
         return fcl.Box(*fixture.size), fcl.Transform(fixture.rotation, fixture.centre)
     mesh = fcl.BVHModel()

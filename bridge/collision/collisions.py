@@ -14,7 +14,7 @@ import numpy as np
 from bridge.collision.collision_objects import MovableBox, are_colliding, fixture_objects
 from bridge.collision.fixtures import Fixture, FixtureBox, bounds_of
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, box_around, gap_between
-from tissue import BoolArray, FloatArray
+from tissue import BoolArray, FloatArray, Geom
 
 GeomShape = Literal["box", "sphere", "capsule", "cylinder"]
 
@@ -62,12 +62,8 @@ class ArmGeom:
     @property
     def half_extents(self) -> FloatArray:
         """Half the size of the geom's bounding box along its own axes [m], shape (3,)."""
-        if self.shape == "box":
-            return np.array(self.sizes)
-        radius = self.sizes[0]
-        half_length = self.sizes[1] if len(self.sizes) > 1 else 0.0
-        caps = 0.0 if self.shape == "cylinder" else radius
-        return np.array([radius, radius, half_length + caps])
+        _, half = Geom(self.name, self.shape, self.sizes).box()
+        return half
 
     def geometry(self) -> fcl.CollisionGeometry:
         """Return a new geometry of the collision library."""

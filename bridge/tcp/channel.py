@@ -27,30 +27,19 @@ LARGEST_PART = LARGEST_FRAME - TAG_BYTES
 """Largest payload of a frame [byte], so that it fits with its authentication tag."""
 
 
-class Channel:
+class Channel(FrameReader):
     """Packs messages into frames, and reads frames from a stream, with or without tags."""
 
     def __init__(self, limit: int = LARGEST_FRAME) -> None:
-        self._reader = FrameReader(limit)
+        super().__init__(limit)
         self._outgoing: Authenticator | None = None
         self._incoming: Authenticator | None = None
         self._plain_error_may_come = False
-        self.feed = self._reader.feed
-        """Append bytes from the socket."""
-
-    @property
-    def is_within_a_frame(self) -> bool:
-        """Whether a part of a frame has arrived, so that the rest must follow."""
-        return self._reader.is_within_a_frame
 
     @property
     def is_authenticated(self) -> bool:
         """Whether both directions have authentication tags."""
         return self._incoming is not None
-
-    def limit_payload(self, limit: int) -> None:
-        """Refuse frames with a payload of more than `limit` bytes from now on."""
-        self._reader.limit = limit
 
     def authenticate(
         self, outgoing: bytes, incoming: bytes, *, plain_error_may_come: bool = False
@@ -83,7 +72,7 @@ class Channel:
         Raises:
             MessageError: it cannot be read, or its tag is wrong. The stream cannot be read further.
         """
-        frame = self._reader.take()
+        frame = super().take()
         if frame is None or self._incoming is None:
             return frame
         may_be_plain = self._plain_error_may_come and self._incoming.n_messages == 0

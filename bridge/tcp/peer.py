@@ -51,7 +51,7 @@ class Peer:
     def become_client(self) -> None:
         """End the handshake: accept requests from now on."""
         self._is_client = True
-        self.channel.limit_payload(LARGEST_FRAME)
+        self.channel.limit = LARGEST_FRAME
         self.wait_for_a_request()
 
     def wait_for_a_request(self) -> None:
