@@ -60,9 +60,9 @@ class ViewerSettings(NamedTuple):
     """Visible shapes of the MuJoCo model."""
     frame: TissueFrame
     """Pose of the tissue frame in the world."""
-    wireframe: bool
+    wireframe: bool = False
     """Whether the edges of the tissue's triangles are drawn at the start."""
-    port: int | None
+    port: int | None = None
     """Port of the page; None for the first free port. That of the first run stays."""
     views: Sequence[ViewTable] = ()
     """Cameras that the page offers."""
@@ -81,7 +81,7 @@ class SceneState(NamedTuple):
     """Surface of the body, tissue frame."""
     body_poses: FloatArray
     """Poses of all bodies of the MuJoCo model, see `model_shapes.body_poses`."""
-    readings: Readings | None
+    readings: Readings | None = None
     """Numbers to show beside the picture."""
     live: LiveState | None = None
     """How the run is, if the page controls it."""

@@ -10,11 +10,12 @@ from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.recording.force_parts import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
 from scalpel_sim.viewer.scene3d import HandState, LiveState, Readings, RunState
 from scalpel_sim.viewer.viewer import Viewer
-from tissue import FloatArray, SurfaceQuantity
+from tissue import SurfaceQuantity
 
 
 def readings(simulation: Simulation) -> Readings:
@@ -52,13 +53,7 @@ def into_replay(replay: ReplayWriter) -> DrawFrame:
 
 def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
     """Add the present state of a simulation to a replay, also before the first frame."""
-    replay.add(
-        simulation.time,
-        simulation.link.surface(),
-        body_poses(simulation.arm.data),
-        readings(simulation),
-        values_in(simulation, get_args(SurfaceQuantity)),
-    )
+    replay.add(simulation.time, state_of(simulation, get_args(SurfaceQuantity)))
 
 
 def into_viewer(
@@ -80,13 +75,7 @@ def into_viewer(
 
 def show_in(viewer: Viewer, simulation: Simulation, live: LiveState | None = None) -> None:
     """Show the present state of a simulation in a live viewer, also before the first frame."""
-    viewer.show(
-        simulation.link.surface(),
-        body_poses(simulation.arm.data),
-        readings(simulation),
-        live,
-        values_in(simulation, sorted(viewer.wanted)),
-    )
+    viewer.show(*state_of(simulation, sorted(viewer.wanted), live))
 
 
 def show_run(viewer: Viewer, simulation: Simulation, controls: RunControls) -> Callable[[], None]:
@@ -111,11 +100,19 @@ def show_run(viewer: Viewer, simulation: Simulation, controls: RunControls) -> C
     return show
 
 
-def values_in(
-    simulation: Simulation, quantities: Iterable[SurfaceQuantity]
-) -> dict[SurfaceQuantity, FloatArray]:
-    """Return quantities at the vertices of the surface."""
-    return {each: simulation.link.surface_values(each) for each in quantities}
+def state_of(
+    simulation: Simulation,
+    quantities: Iterable[SurfaceQuantity] = (),
+    live: LiveState | None = None,
+) -> SceneState:
+    """Return what a picture of a simulation shows now, with quantities on the surface."""
+    return SceneState(
+        simulation.link.surface(),
+        body_poses(simulation.arm.data),
+        readings(simulation),
+        live,
+        {each: simulation.link.surface_values(each) for each in quantities},
+    )
 
 
 def live_state(controls: RunControls) -> LiveState:

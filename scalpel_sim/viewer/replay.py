@@ -3,9 +3,8 @@
 import base64
 import gzip
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import mujoco
 
@@ -14,12 +13,10 @@ from scalpel_sim.errors import RunError
 from scalpel_sim.recording.growing_file import FileSum
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
-from scalpel_sim.viewer.messages import NO_VALUES, SceneState
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.page import replay_page
-from scalpel_sim.viewer.scene3d import Readings
 from scalpel_sim.viewer.scene_packets import ScenePackets
-from tissue import FloatArray, Surface, SurfaceQuantity
 
 FRAMES_PER_SECOND = 25.0
 """Frames kept per second of simulated time, as long as the file stays small enough."""
@@ -41,15 +38,6 @@ _CAPTION = (
 
 _PLACE = "<!-- the packets of the run -->"
 """Stands in the page for what is written one frame after the other."""
-
-
-class _Frame(NamedTuple):
-    """One frame of the replay."""
-
-    time: float
-    """Simulated time [s]."""
-    state: SceneState
-    """What the frame shows."""
 
 
 class ReplayWriter:
@@ -85,7 +73,7 @@ class ReplayWriter:
         self._wireframe = wireframe
         self._views = tuple(views)
         self._log = FrameLog() if log is None else log
-        self._last: _Frame | None = None
+        self._last: tuple[float, SceneState] | None = None
         self._frames: list[LoggedFrame] = []
         self._interval = 1.0 / FRAMES_PER_SECOND
         self._read_log()
@@ -97,33 +85,22 @@ class ReplayWriter:
         """
         return not self._frames or time >= self._frames[-1].time + 0.999 * self._interval
 
-    def add(
-        self,
-        time: float,
-        surface: Surface,
-        body_poses: FloatArray,
-        readings: Readings | None = None,
-        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
-    ) -> None:
+    def add(self, time: float, state: SceneState) -> None:
         """Add a frame, which is kept if enough time has passed, or if no other frame follows.
 
         Args:
             time: Simulated time [s].
-            surface: Surface of the body, tissue frame. Kept, not copied.
-            body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
-            readings: Numbers to show beside the picture.
-            values: Quantities at the vertices of the surface, which the page offers as colours.
+            state: What the frame shows. Kept, not copied; the page offers its values as colours.
 
         Raises:
             RunError: the file of the frames cannot be written.
         """
-        frame = _Frame(time, SceneState(surface, body_poses, readings, values=values))
         if not self.is_due(time):
-            self._last = frame
+            self._last = time, state
             return
         self._last = None
         try:
-            self._keep(self._log.add(*frame))
+            self._keep(self._log.add(time, state))
         except OSError as error:
             where = self._log.path or tempfile.gettempdir()
             raise RunError(
@@ -172,10 +149,10 @@ class ReplayWriter:
                 file.write(element if i == 0 else f"\n{element}")
             file.write(tail)
 
-    def _all(self) -> Iterator[_Frame]:
-        """Yield all frames, of which one is in memory."""
+    def _all(self) -> Iterator[tuple[float, SceneState]]:
+        """Yield time [s] and content of all frames, of which one is in memory."""
         for frame in self._frames:
-            yield _Frame(frame.time, self._log.read(frame))
+            yield frame.time, self._log.read(frame)
         if self._last is not None:
             yield self._last
 
@@ -189,7 +166,7 @@ class ReplayWriter:
         for i, (time, state) in enumerate(self._all()):
             if i == 0:
                 yield _script(packets.opening(state.surface, state.body_poses), time)
-            yield _script(packets.frame(*state), time)
+            yield _script(packets.frame(state), time)
 
 
 def _script(packet: bytes, time: float) -> str:

@@ -27,14 +27,6 @@ from tissue import Energies, FloatArray, IntArray
 _EXTENSION = {"uint8": 0x12, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
 """MessagePack extension type of each kind of typed array. Source: msgpack-lite, the decoder inside
 meshcat's viewer."""
-_JAVASCRIPT_ARRAY = {
-    "uint8": "Uint8Array",
-    "int16": "Int16Array",
-    "uint16": "Uint16Array",
-    "uint32": "Uint32Array",
-    "float32": "Float32Array",
-}
-"""JavaScript class of each kind of typed array."""
 
 INT16_MAX = 32767
 """Largest 16-bit integer, which stands for 1 in normals and tints."""
@@ -282,7 +274,7 @@ def _pack(array: FloatArray | IntArray, kind: str, *, normalized: bool = False) 
     body = np.ascontiguousarray(array, dtype=kind).tobytes()
     return {
         "itemSize": 1 if array.ndim == 1 else array.shape[1],
-        "type": _JAVASCRIPT_ARRAY[kind],
+        "type": f"{kind.capitalize()}Array",
         "array": msgspec.msgpack.Ext(_EXTENSION[kind], body),
         "normalized": normalized,
     }

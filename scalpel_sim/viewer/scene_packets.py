@@ -8,10 +8,10 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
-from scalpel_sim.viewer.messages import NO_VALUES
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.primitives import TriangleMesh
-from scalpel_sim.viewer.scene3d import Appearance, Camera, LiveState, Readings, Scene3D
+from scalpel_sim.viewer.scene3d import Appearance, Camera, Scene3D
 from scalpel_sim.viewer.textures import map_texture
 from tissue import FloatArray, IntArray, Surface, SurfaceQuantity
 
@@ -138,35 +138,20 @@ class ScenePackets:
         scene.set_wireframe(self._wireframe)
         return scene.take()
 
-    def frame(
-        self,
-        surface: Surface,
-        body_poses: FloatArray,
-        readings: Readings | None = None,
-        live: LiveState | None = None,
-        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
-    ) -> bytes:
-        """Return the packet that shows one instant.
-
-        Args:
-            surface: Surface of the body, tissue frame.
-            body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
-            readings: Numbers to show beside the picture.
-            live: How the run is that the page controls.
-            values: Quantities at the vertices of the surface, to be shown as colours.
-        """
+    def frame(self, state: SceneState) -> bytes:
+        """Return the packet that shows one instant."""
         scene = Scene3D()
-        levels, tops = levels_of(values)
-        textured = map_texture(surface, self._diagonal / TILES_PER_BODY, levels)
+        levels, tops = levels_of(state.values)
+        textured = map_texture(state.surface, self._diagonal / TILES_PER_BODY, levels)
         scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
         scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
         scene.set_scales(tops)
         for body in self._bodies:
-            scene.set_pose(f"/bodies/{body}", *position_and_rotation(body_poses[body]))
-        if readings is not None:
-            scene.set_readings(readings, ARROW_LENGTH * self._diagonal)
-        if live is not None:
-            scene.set_live(live)
+            scene.set_pose(f"/bodies/{body}", *position_and_rotation(state.body_poses[body]))
+        if state.readings is not None:
+            scene.set_readings(state.readings, ARROW_LENGTH * self._diagonal)
+        if state.live is not None:
+            scene.set_live(state.live)
         return scene.take()
 
     def _set_shape(

@@ -136,7 +136,7 @@ class OpenPages:
             self._opening = self._packets.opening(state.surface, state.body_poses)
             for page in list(self._pages):  # one that is closed goes when it is sent something
                 page.send(self._opening)
-        self._newest = self._packets.frame(*state)
+        self._newest = self._packets.frame(state)
         self._shown = state
         for page in list(self._pages):
             self.send_newest(page)

@@ -101,18 +101,9 @@ class Viewer:
 
             meshcat_scene.expect_visualizer(visualizer)
         self._process = _start_process()  # it starts while the shapes are made here
-        shapes = [] if model is None else list(shapes_of(model))
-        self._settings: ViewerSettings | None = ViewerSettings(
-            title,
-            shapes,
-            frame or TissueFrame(),
-            wireframe,
-            port,
-            views,
-            has_controls=controls is not None,
-            is_led=controls is not None and controls.is_led,
-            choices=None if controls is None else controls.choices,
-        )
+        at = frame or TissueFrame()
+        settings = _settings_of(model, title, at, views, controls)
+        self._settings: ViewerSettings | None = settings._replace(wireframe=wireframe, port=port)
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
         self._waiting: SceneState | None = None
@@ -199,20 +190,9 @@ class Viewer:
             controls: What the page may do with the run; its commands go where they went.
             views: Cameras that the page offers; it begins with the first.
         """
-        shapes = list(shapes_of(model))
+        settings = _settings_of(model, title, frame, views, controls)
         with self._changed:
-            self._settings = ViewerSettings(
-                title,
-                shapes,
-                frame,
-                wireframe=False,
-                port=None,
-                views=views,
-                has_controls=True,
-                is_led=controls.is_led,
-                choices=controls.choices,
-            )
-            self._waiting = None
+            self._settings, self._waiting = settings, None
             self._changed.notify()
 
     def close(self) -> None:
@@ -280,6 +260,25 @@ class Viewer:
             reason = reply.error or f"its process ended with code {self._process.returncode}"
             raise RunError(f"the viewer did not start: {reason}")
         return reply
+
+
+def _settings_of(
+    model: mujoco.MjModel | None,
+    title: str,
+    frame: TissueFrame,
+    views: Sequence[ViewTable],
+    controls: PageControls | None,
+) -> ViewerSettings:
+    """Return the settings of a run, for the viewer's process."""
+    return ViewerSettings(
+        title,
+        [] if model is None else list(shapes_of(model)),
+        frame,
+        views=views,
+        has_controls=controls is not None,
+        is_led=controls is not None and controls.is_led,
+        choices=None if controls is None else controls.choices,
+    )
 
 
 def _start_process() -> subprocess.Popen[bytes]:

@@ -11,8 +11,8 @@ from bridge import TcpLink
 from bridge.tcp.server import TissueServer
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.preparation.tissue import make_tissue
-from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
-from scalpel_sim.viewer.pictures import readings, values_in
+from scalpel_sim.viewer.model_shapes import shapes_of
+from scalpel_sim.viewer.pictures import state_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.support.run_files import untimed
 from tissue import StateError, SurfaceQuantity
@@ -30,9 +30,7 @@ def go_on(simulation):
 def picture(simulation):
     """Return what a page is told to show of a simulation."""
     packets = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
-    values = values_in(simulation, get_args(SurfaceQuantity))
-    surface, poses = simulation.link.surface(), body_poses(simulation.arm.data)
-    return packets.frame(surface, poses, readings(simulation), None, values)
+    return packets.frame(state_of(simulation, get_args(SurfaceQuantity)))
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ from scalpel_sim.validate.speed.tables import compact_table
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
-from scalpel_sim.viewer.pictures import readings
+from scalpel_sim.viewer.pictures import state_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tissue import SCHEMES, FloatArray, block
 
@@ -209,7 +209,7 @@ def _picture_timer(simulation: Simulation, seconds: list[float]) -> DrawFrame:
     def picture(now: Simulation) -> None:
         if len(now.recording) % every == 0:
             start = perf_counter()
-            packets.frame(now.link.surface(), body_poses(now.arm.data), readings(now))
+            packets.frame(state_of(now))
             seconds.append(perf_counter() - start)
 
     return picture

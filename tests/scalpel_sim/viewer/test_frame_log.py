@@ -69,7 +69,9 @@ def test_a_replay_that_is_gone_on_with_is_that_of_a_whole_run(at, tmp_path, monk
     def play(replay, first, end):
         for i in range(first, end):
             if replay.is_due(0.04 * i):
-                replay.add(0.04 * i, cut_tissue()[0], body_poses(data), readings(0.04 * i))
+                replay.add(
+                    0.04 * i, SceneState(cut_tissue()[0], body_poses(data), readings(0.04 * i))
+                )
 
     log = FrameLog(tmp_path / "b")
     whole, killed = ReplayWriter(model, log=FrameLog(tmp_path / "a")), ReplayWriter(model, log=log)

@@ -10,6 +10,7 @@ from scalpel_sim.recording.force_parts import ForceParts
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import page
 from scalpel_sim.viewer import replay as replay_module
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import BYTES_PER_TRIANGLE, ReplayWriter
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
@@ -29,7 +30,7 @@ def write_cut(path, *, n_frames=3, wireframe=False, title="a block"):
     replay = ReplayWriter(model, title=title, frame=FRAME, wireframe=wireframe)
     for i in range(n_frames):
         surface = cut_tissue()[min(i, 2)]
-        replay.add(0.1 * i, surface, body_poses(data), readings(0.1 * i))
+        replay.add(0.1 * i, SceneState(surface, body_poses(data), readings(0.1 * i)))
     replay.write(path)
 
 
@@ -38,7 +39,7 @@ def test_a_run_of_a_second_is_kept_as_twenty_five_frames_and_its_last(tmp_path):
     replay = ReplayWriter(model)
     whole, poses = cut_tissue()[0], body_poses(data)
     for frame in range(1000):
-        replay.add(frame / 1000, whole, poses)
+        replay.add(frame / 1000, SceneState(whole, poses))
     replay.write(tmp_path / "replay.html")
     times = times_in(tmp_path / "replay.html")
     assert len(times) == 26
@@ -54,7 +55,7 @@ def test_a_heavy_body_gets_fewer_frames_evenly_spread(tmp_path, monkeypatch):
     replay = ReplayWriter(model)
     for frame in range(100):
         if replay.is_due(frame * 0.04):
-            replay.add(frame * 0.04, whole, poses)
+            replay.add(frame * 0.04, SceneState(whole, poses))
     replay.write(tmp_path / "replay.html")
     times = times_in(tmp_path / "replay.html")
     assert 5 <= len(times) <= 10
@@ -124,7 +125,7 @@ def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp
         ),
     )
     replay = ReplayWriter(model, frame=FRAME)
-    replay.add(0.0, cut_tissue()[0], body_poses(data), shown)
+    replay.add(0.0, SceneState(cut_tissue()[0], body_poses(data), shown))
     replay.write(tmp_path / "replay.html")
     tab.goto(local_file(tmp_path / "replay.html"))
     tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
@@ -146,7 +147,7 @@ def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
     above = ViewTable(name="above", eye=(0.02, 0.03, 0.3), target=(0.02, 0.03, 0.0), up=(0, 1, 0))
     side = ViewTable(name="<side>", eye=(0.3, 0, 0), target=(0, 0, 0), fov_degrees=20.0)
     replay = ReplayWriter(little_arm()[0], frame=FRAME, views=[above, side])
-    replay.add(0.0, cut_tissue()[0], body_poses(little_arm()[1]), readings(0.0))
+    replay.add(0.0, SceneState(cut_tissue()[0], body_poses(little_arm()[1]), readings(0.0)))
     replay.write(tmp_path / "replay.html")
     tab.goto(local_file(tmp_path / "replay.html"))
     tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")

@@ -5,6 +5,7 @@ import pytest
 
 from bridge import TissueFrame
 from scalpel_sim.scene.schema import ViewTable
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.cut_block import cut_block
@@ -74,7 +75,7 @@ def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
     first = commands(packets.opening(cut_block(0.0), body_poses(data)))
     data.qpos[0] = 0.01
     mujoco.mj_kinematics(model, data)
-    later = commands(packets.frame(cut_block(0.01), body_poses(data), readings(0.1)))
+    later = commands(packets.frame(SceneState(cut_block(0.01), body_poses(data), readings(0.1))))
     assert first["set_transform /tissue"]["matrix"][12:15] == pytest.approx(FRAME.origin)
     assert "set_transform /tissue" not in later
     handle = model.body("handle").id
@@ -87,7 +88,7 @@ def test_textures_are_sent_once_and_geometry_with_every_frame():
     model, data = little_arm()
     packets = ScenePackets(shapes_of(model), FRAME)
     first = commands(packets.opening(cut_block(0.0), body_poses(data)))
-    later = commands(packets.frame(cut_block(0.01), body_poses(data)))
+    later = commands(packets.frame(SceneState(cut_block(0.01), body_poses(data))))
     assert {"set_appearance skin", "set_appearance cut"} <= first.keys()
     assert {"set_object /tissue/skin", "set_object /tissue/cut"} <= later.keys()
     assert not any(key.startswith("set_appearance") for key in later)
