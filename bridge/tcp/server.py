@@ -28,9 +28,9 @@ from bridge.tcp.messages.driven import (
     LOAD,
     LOADS,
     MAX_FRAMES,
+    NUMBER,
     TIE,
     unpack_geoms,
-    unpack_number,
 )
 from bridge.tcp.messages.step import RESULT, StepReply, unpack_step
 from bridge.tcp.messages.text import DESCRIPTION, MAX_VIEWS, sent_scene_name
@@ -94,21 +94,7 @@ def serve(
 
 
 class TissueServer(SingleClientServer):
-    """Serves a tissue to one client at a time.
-
-    Args:
-        make_tissue: Function that makes the tissue for a client, the same every time.
-        scene: Name of what it makes, as the command line gives it.
-        views: Cameras of that scene.
-        host: Host to listen on; without a key only loopback.
-        port: Port to listen on; 0 for a free one.
-        key: Key that a client must have too; None to serve any client on this machine.
-
-    Raises:
-        ValueError: the host is not on loopback and there is no key, the port is out of range, or
-            there are more than `MAX_VIEWS`.
-        LinkError: the port is in use or not allowed.
-    """
+    """Serves a tissue to one client at a time; `serve` has the same arguments and errors."""
 
     def __init__(
         self,
@@ -206,8 +192,9 @@ class TissueServer(SingleClientServer):
         Raises:
             MessageError: there is no such frame.
         """
-        number = unpack_number(payload, len(self._link.loads()))
-        self._link.release(number)
+        number = NUMBER.unpack(payload)
+        with _refusals():
+            self._link.release(number)
         return LOAD.pack(self._link.loads()[number])
 
     def _collide(self, payload: bytes) -> bytes:

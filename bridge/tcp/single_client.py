@@ -10,7 +10,6 @@ import abc
 import logging
 import selectors
 import time
-from types import TracebackType
 from typing import Self
 
 from bridge.link import LinkError
@@ -87,12 +86,7 @@ class SingleClientServer(abc.ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property

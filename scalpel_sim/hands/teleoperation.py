@@ -5,7 +5,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -60,11 +60,17 @@ class Teleoperation(abc.ABC):
         """Simulated time at which it has ended [s]; from then on all rest."""
         self.n_limited = 0
         """Frames in which a limit of speed, turn rate or room held an instrument back."""
-        self._frame, self._clock = simulation.frame, clock
-        self._dt, self._seconds = simulation.dt, seconds
+        frame, dt = simulation.frame, simulation.dt
+        self._frame, self._clock = frame, clock
+        self._dt, self._seconds = dt, seconds
         self._heard_at = -math.inf
-        self.blade = _live_blade(simulation)
-        self.graspers = _live_graspers(simulation)
+        assert simulation.workspace is not None
+        start, hand = simulation.stroke.start, simulation.arm.hand
+        self.blade = LiveBlade(hand, start, frame, simulation.workspace, dt)
+        self.graspers = tuple(
+            LiveGrasper(each.grasper, each.motion, frame, cast(FloatArray, each.workspace), dt)
+            for each in simulation.graspers
+        )
         self.instruments: tuple[LiveInstrument, ...] = (self.blade, *self.graspers)
         """Instruments that it may choose."""
         self.chosen = 0
@@ -127,23 +133,6 @@ class Teleoperation(abc.ABC):
         """Release the chosen instrument: it rests where it is."""
         self.is_engaged = False
         self.instruments[self.chosen].pose.rest()
-
-
-def _live_blade(simulation: Simulation) -> LiveBlade:
-    """Return the blade of a simulation that was prepared to be led."""
-    assert simulation.workspace is not None
-    start, hand = simulation.stroke.start, simulation.arm.hand
-    return LiveBlade(hand, start, simulation.frame, simulation.workspace, simulation.dt)
-
-
-def _live_graspers(simulation: Simulation) -> tuple[LiveGrasper, ...]:
-    """Return the graspers of a simulation that was prepared to be led."""
-    found = []
-    for each in simulation.graspers:
-        assert each.workspace is not None
-        frame, dt = simulation.frame, simulation.dt
-        found.append(LiveGrasper(each.grasper, each.motion, frame, each.workspace, dt))
-    return tuple(found)
 
 
 class LiveHand(Teleoperation):

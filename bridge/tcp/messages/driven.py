@@ -146,18 +146,6 @@ def unpack_geoms(payload: bytes) -> tuple[Sequence[Geom], GeomPoses]:
     return geoms, checked_poses(rows, "geom")
 
 
-def unpack_number(payload: bytes, n: int) -> int:
-    """Return the number of one of `n` frames.
-
-    Raises:
-        MessageError: there is no such frame.
-    """
-    number = NUMBER.unpack(payload)
-    if number >= n:
-        raise MessageError(f"there is no frame {number}; there are {n}, counted from 0")
-    return number
-
-
 def _check_attachment(attachment: FrameAttachment) -> None:
     if attachment.origin is not None:
         expect_near(attachment.origin, "the origin of a frame")

@@ -40,7 +40,6 @@ from bridge.tcp.messages.driven import (
     TIE,
     pack_geoms,
     unpack_geoms,
-    unpack_number,
 )
 from bridge.tcp.messages.step import RESULT, StepReply, pack_step, unpack_result, unpack_step
 from bridge.tcp.messages.text import DESCRIPTION, pack_error, unpack_error
@@ -79,7 +78,7 @@ def real_messages():
         "attachment": (ATTACHMENT.pack(attachment), ATTACHMENT.unpack),
         "tie": (TIE.pack(tie), TIE.unpack),
         "loads": (LOADS.pack(LOADS_ON_TWO), LOADS.unpack),
-        "number": (NUMBER.pack(1), lambda payload: unpack_number(payload, 2)),
+        "number": (NUMBER.pack(1), NUMBER.unpack),
         "result": (
             RESULT.pack(StepReply(result, LOADS_ON_TWO, GEOM_LOADS)),
             lambda payload: unpack_result(payload, 2),
@@ -183,7 +182,7 @@ IS_VALID = {
     "quantity": lambda value: value in ("displacement", "strain", "stress"),
     "values": is_finite,
     "pieces": lambda value: value >= 0,
-    "number": lambda value: 0 <= value < 2,
+    "number": lambda value: value >= 0,
     "cut report": lambda value: value.now.altitude >= 0.0,
     "servo": lambda value: is_finite(value.stamp, value.period, *value.servo_cp),
     "state": lambda value: is_finite(value.time, *value.measured_cp, *value.measured_cf),
