@@ -228,28 +228,12 @@ class InProcessLink:
 
     def attach(self, attachment: FrameAttachment) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
-        frame = self._tissue.attach(
-            attachment.where,
-            stiffness=attachment.stiffness,
-            damping=attachment.damping,
-            breaks_at=attachment.breaks_at,
-            origin=None if attachment.origin is None else attachment.origin.tolist(),
-        )
-        return self._added(frame)
+        return self._added(self._tissue.attach(**attachment._asdict()))
 
     def tie(self, tie: FrameTie) -> int:
         """Tie the body by strands to a frame; see `TissueLink.tie`."""
-        ligament = self._tissue.tie(
-            tie.where,
-            tie.to[0] if len(tie.to) == 1 else tie.to,
-            stiffness=tie.stiffness,
-            area=tie.area,
-            toughness=tie.toughness,
-            damping=tie.damping,
-            rest_length=tie.rest_length,
-            breaks_at=tie.breaks_at,
-        )
-        return self._added(ligament)
+        ends = tie.to[0] if len(tie.to) == 1 else tie.to
+        return self._added(self._tissue.tie(**tie._asdict() | {"to": ends}))
 
     def _added(self, frame: Attachment) -> int:
         """Add a frame, and return its number."""

@@ -7,7 +7,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from bridge.link import LinkError
 from bridge.tcp.address import is_loopback, keep_alive, parse_address
@@ -341,20 +341,13 @@ def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:
     return socket.create_connection(addresses[-1][:2], seconds)
 
 
-class Pausing(Protocol):
-    """A client that may pause."""
-
-    def show_presence(self, silence: float) -> bool:
-        """Send a request if none was sent for so long [s]; return whether that is still due."""
-
-
 class Heartbeat:
-    """Calls a client's `show_presence` until it is closed, or there is no such client any more.
+    """Calls `show_presence` of a connection until that is closed, or nobody refers to it any more.
 
     A process that hangs, or is stopped, has no heartbeat. One that pauses has.
     """
 
-    def __init__(self, client: Pausing) -> None:
+    def __init__(self, client: Connection) -> None:
         self._ended = threading.Event()
         # A client that nobody refers to any more closes its connection: not to be kept alive.
         threading.Thread(
@@ -366,7 +359,7 @@ class Heartbeat:
         self._ended.set()
 
 
-def _beat(client: "weakref.ref[Pausing]", ended: threading.Event) -> None:
+def _beat(client: "weakref.ref[Connection]", ended: threading.Event) -> None:
     while not ended.wait(HEARTBEAT_SECONDS / 4.0):
         found = client()
         if found is None or not found.show_presence(HEARTBEAT_SECONDS):

@@ -54,22 +54,22 @@ class _Places(NamedTuple):
     """Places in the body at rest [m], shape (n, 3)."""
 
 
-class _Region:
+class _Region(Record):
     """A region, as a map with the name of its kind."""
 
-    _places = Record(_Places, nodes=("nodes",), points=("points", 3))
-    type: Any = _places.type
+    def __init__(self) -> None:
+        super().__init__(_Places, nodes=("nodes",), points=("points", 3))
 
     def plain(self, value: Any) -> Any:
         """Return the map."""
         if isinstance(value, str):
-            return self._places.plain(_Places(region=value))
+            return super().plain(_Places(region=value))
         kind = "nodes" if value.dtype.kind in "iu" else "points"
-        return self._places.plain(_Places()._replace(**{kind: value}))
+        return super().plain(_Places()._replace(**{kind: value}))
 
     def value(self, plain: Any, lengths: dict[str, int]) -> TissueRegion:
         """Return the region that a map names."""
-        region, nodes, points = self._places.value(plain, lengths)
+        region, nodes, points = super().value(plain, lengths)
         given = [each for each in (region, nodes, points) if each is not None]
         if len(given) != 1 or not len(given[0]):
             raise MessageError(

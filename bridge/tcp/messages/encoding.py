@@ -7,7 +7,7 @@ does not say is added: shapes of arrays, and bounds of numbers.
 import math
 import sys
 from collections.abc import Callable
-from typing import Annotated, Any, Generic, Protocol, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, Generic, TypeVar, get_args, get_type_hints
 
 import msgspec
 import numpy as np
@@ -64,14 +64,19 @@ class Message(Generic[_T]):
         return value
 
 
-class Part(Protocol):
-    """A part of a content, between a value and what MessagePack has."""
+class Part:
+    """A part of a content, between a value and what MessagePack has: here the value itself.
 
-    type: Any
-    """Types that MessagePack has, as `msgspec` checks them."""
+    Args:
+        kind: Types that MessagePack has, as `msgspec` checks them.
+    """
+
+    def __init__(self, kind: Any) -> None:
+        self.type = kind
 
     def plain(self, value: Any) -> Any:
         """Return what MessagePack has for a value."""
+        return value
 
     def value(self, plain: Any, lengths: dict[str, int]) -> Any:
         """Return the value of what MessagePack has.
@@ -83,9 +88,10 @@ class Part(Protocol):
         Raises:
             MessageError: an array has another length.
         """
+        return plain
 
 
-class Array:
+class Array(Part):
     """An array of a known type and shape.
 
     Args:
@@ -95,9 +101,8 @@ class Array:
         what: Name of the array, for errors.
     """
 
-    type: Any = bytearray
-
     def __init__(self, scalar: Any, shape: tuple[Any, ...], what: str) -> None:
+        super().__init__(bytearray)
         self._stored = np.dtype(scalar).newbyteorder("<")
         self._scalar, self._first, self._rest = np.dtype(scalar), shape[0], shape[1:]
         self._row_bytes = self._stored.itemsize * math.prod(self._rest)
@@ -120,7 +125,7 @@ class Array:
         return array.astype(self._scalar, copy=False)
 
 
-class Many:
+class Many(Part):
     """A tuple of named tuples.
 
     Args:
@@ -129,7 +134,7 @@ class Many:
     """
 
     def __init__(self, record: "Record", limit: int) -> None:
-        self.type: Any = Annotated[list[record.type], msgspec.Meta(max_length=limit)]  # type: ignore[name-defined]
+        super().__init__(Annotated[list[record.type], msgspec.Meta(max_length=limit)])  # type: ignore[name-defined]
         self._record = record
 
     def plain(self, value: Any) -> Any:
@@ -141,7 +146,7 @@ class Many:
         return tuple(self._record.value(each, lengths) for each in plain)
 
 
-class Record:
+class Record(Part):
     """A named tuple, as a map of its fields.
 
     Args:
@@ -162,8 +167,8 @@ class Record:
                 {name: kind._field_defaults.get(name)} if is_optional else kind._field_defaults
             )
             given.append((name, found, default[name]) if name in default else (name, found))
-        self.type: Any = msgspec.defstruct(
-            kind.__name__, given, kw_only=True, forbid_unknown_fields=True
+        super().__init__(
+            msgspec.defstruct(kind.__name__, given, kw_only=True, forbid_unknown_fields=True)
         )
 
     def plain(self, value: Any) -> Any:
@@ -181,21 +186,6 @@ class Record:
         return self._kind._make(
             None if each is None else part.value(each, own) for part, each in found
         )
-
-
-class _Plain:
-    """Value of a type that MessagePack has itself."""
-
-    def __init__(self, kind: Any) -> None:
-        self.type = kind
-
-    def plain(self, value: Any) -> Any:
-        """Return the value."""
-        return value
-
-    def value(self, plain: Any, lengths: dict[str, int]) -> Any:
-        """Return the value."""
-        return plain
 
 
 def _field_part(name: str, hint: Any, fields: dict[str, Any]) -> Part:
@@ -216,8 +206,7 @@ def _field_part(name: str, hint: Any, fields: dict[str, Any]) -> Part:
 
 def _part_of(given: Any) -> Part:
     """Return a part, which is a plain one where a type is given."""
-    part: Part = given if hasattr(given, "plain") else _Plain(given)
-    return part
+    return given if isinstance(given, Part) else Part(given)
 
 
 def _of_scalar(value: Any) -> Any:

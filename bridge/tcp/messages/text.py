@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from bridge.link import SceneView, TissueDescription
-from bridge.tcp.messages.encoding import Count, FiniteFloat, Many, Message, Record
+from bridge.tcp.messages.encoding import Count, FiniteFloat, Many, Message, Part, Record
 from bridge.tcp.wire import MessageError
 from tissue import Material
 
@@ -65,16 +65,8 @@ def _check_description(description: TissueDescription) -> None:
         raise MessageError("a view of the scene has a control character in its name")
 
 
-class _Material:
+class _Material(Part):
     """A material: a map of its keys."""
-
-    type: Any = msgspec.defstruct(
-        "Material",
-        [
-            (name, tuple[tuple[float, float], ...] if name == "prony" else type(value), value)
-            for name, value in Material().as_keys().items()
-        ],
-    )
 
     def plain(self, value: Material) -> Any:
         """Return a map of the keys."""
@@ -89,12 +81,21 @@ class _Material:
 
 
 _Place = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+_Curve = tuple[tuple[float, float], ...]
 
 DESCRIPTION: Message[TissueDescription] = Message(
     Record(
         TissueDescription,
         scene=SentSceneName,
-        material=_Material(),
+        material=_Material(
+            msgspec.defstruct(
+                "Material",
+                [
+                    (name, _Curve if name == "prony" else type(value), value)
+                    for name, value in Material().as_keys().items()
+                ],
+            )
+        ),
         bounds=(2, 3),
         n_tetrahedra=Count,
         n_nodes=Count,
