@@ -20,7 +20,7 @@ import numpy as np
 
 from scalpel_sim.recording.force_parts import ForceParts
 from scalpel_sim.recording.recording import TERMS
-from scalpel_sim.scene.schema import DEFAULT_FOV
+from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 
@@ -130,21 +130,6 @@ class LiveState(NamedTuple):
     """The hand that it leads; None: a script leads it."""
 
 
-class Camera(NamedTuple):
-    """Where the scene is looked at from, world frame."""
-
-    name: str
-    """What the page calls it."""
-    eye: FloatArray
-    """Position [m], shape (3,)."""
-    target: FloatArray
-    """Point in the middle of the picture [m], shape (3,)."""
-    up: FloatArray = np.array([0.0, 0.0, 1.0])
-    """Direction to the upper side of the picture, shape (3,)."""
-    fov: float = DEFAULT_FOV
-    """Angle from the lower to the upper side of the picture [deg]."""
-
-
 class Scene3D:
     """Collects changes of the scene, until `take` returns them as one packet."""
 
@@ -210,14 +195,18 @@ class Scene3D:
         matrix[:3, 3] = position
         self._add("set_transform", path=path, matrix=matrix.T.ravel().tolist())
 
-    def set_cameras(self, cameras: Sequence[Camera], extent: float) -> None:
+    def set_cameras(self, views: Sequence[ViewTable], extent: float) -> None:
         """Set the cameras that the page offers; it uses the first, and lights that suit it.
 
         Args:
-            cameras: One or more.
+            views: One or more, in the frame of the world.
             extent: Size of the scene [m], which the lights suit.
         """
-        self._add("set_cameras", cameras=[each._asdict() for each in cameras], extent=extent)
+        cameras = [
+            {"name": v.name, "eye": v.eye, "target": v.target, "up": v.up, "fov": v.fov_degrees}
+            for v in views
+        ]
+        self._add("set_cameras", cameras=cameras, extent=extent)
 
     def set_wireframe(self, is_on: bool) -> None:
         """Switch the wireframe on or off: the edges of the tissue's triangles."""

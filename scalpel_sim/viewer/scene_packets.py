@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from bridge import TissueFrame
 from scalpel_sim.scene.schema import ViewTable
@@ -11,7 +12,7 @@ from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.primitives import TriangleMesh
-from scalpel_sim.viewer.scene3d import Appearance, Camera, Scene3D
+from scalpel_sim.viewer.scene3d import Appearance, Scene3D
 from scalpel_sim.viewer.textures import map_texture
 from tissue import FloatArray, IntArray, Surface, SurfaceQuantity
 
@@ -133,7 +134,8 @@ class ScenePackets:
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
         cameras = [*map(self._camera, self._views)]
         if OWN_VIEW not in [camera.name for camera in cameras]:
-            cameras.append(Camera(OWN_VIEW, self._eye(centre, body_poses), centre))
+            eye, target = self._eye(centre, body_poses).tolist(), centre.tolist()
+            cameras.append(ViewTable(name=OWN_VIEW, eye=eye, target=target))
         scene.set_cameras(cameras, self._diagonal)
         scene.set_wireframe(self._wireframe)
         return scene.take()
@@ -169,11 +171,11 @@ class ScenePackets:
         scene.set_mesh(path, mesh, appearance)
         scene.set_pose(path, position, rotation)
 
-    def _camera(self, view: ViewTable) -> Camera:
-        """Return the camera of a view, in the frame of the world."""
-        eye, target = self._frame.points_to_world(np.array([view.eye, view.target]))
-        up = self._frame.vectors_to_world(np.array(view.up))
-        return Camera(view.name, eye, target, up, view.fov_degrees)
+    def _camera(self, view: ViewTable) -> ViewTable:
+        """Return a view in the frame of the world."""
+        eye, target = self._frame.points_to_world(np.array([view.eye, view.target])).tolist()
+        up = self._frame.vectors_to_world(np.array(view.up)).tolist()
+        return replace(view, eye=eye, target=target, up=up)
 
     def _arms(self, body_poses: FloatArray) -> list[FloatArray]:
         """Return where each arm is, seen from above: the mean of its bodies [m], shape (2,)."""

@@ -120,7 +120,7 @@ class Viewer:
         )
         self._listener.start()
         if visualizer is not None:
-            self._scene = meshcat_scene.MeshcatScene(visualizer, shapes, frame or TissueFrame())
+            self._scene = meshcat_scene.MeshcatScene(visualizer, settings.shapes, at)
 
     def __enter__(self) -> "Viewer":
         return self
