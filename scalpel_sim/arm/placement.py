@@ -52,6 +52,19 @@ class PlacementError(UsageError):
     """No arm that was asked for reaches the stroke."""
 
 
+class Neighbours(NamedTuple):
+    """What an arm with a grasper stands beside, tissue frame."""
+
+    boxes: FloatArray
+    """Lowest and highest corners of what lies there [m], shape (2, 3) or (n, 2, 3): see `place`."""
+    times: FloatArray
+    """Instants at which the arm must reach, and be clear of the others [s]."""
+    table: float | None = None
+    """Height of the table on which it stands [m]; None: of its own."""
+    others: Sequence[Spheres] = ()
+    """What covers the arms that stand there, at these instants."""
+
+
 class Placement(NamedTuple):
     """Where arm and tissue stand. World frame; its axes are the tissue's, the table is z = 0."""
 
@@ -72,6 +85,8 @@ class Placement(NamedTuple):
     margin: float
     """Smallest distance of a joint from an end of its range along the stroke, as a fraction of half
     the range."""
+    edge_height: float
+    """Distance of the edge from the axis of the instrument [m]; 0 for a grasper."""
 
     def arm(
         self,
@@ -138,10 +153,8 @@ def place_if_reached(
     Raises:
         UsageError: no arm has this name.
     """
-    if preset != AUTO and preset not in ARMS:
-        raise unknown("arm", preset, [*ARMS, AUTO])
     found = None
-    for name in ARMS if preset == AUTO else (preset,):
+    for name in _arms_to_try(preset):
         placement = _place(stroke, boxes, name)
         if placement.margin >= NEEDED_MARGIN:
             found = placement
@@ -150,14 +163,7 @@ def place_if_reached(
     return found
 
 
-def covered(
-    placement: Placement,
-    stroke: Stroke,
-    boxes: FloatArray,
-    times: FloatArray,
-    *,
-    edge_height: float | None = None,
-) -> Spheres:
+def covered(placement: Placement, stroke: Stroke, boxes: FloatArray, times: FloatArray) -> Spheres:
     """Return spheres that cover an arm, up to its instrument, along a stroke.
 
     Args:
@@ -165,29 +171,24 @@ def covered(
         stroke: Its stroke, tissue frame.
         boxes: Lowest and highest corners of what lies there [m], shape (2, 3) or (n, 2, 3).
         times: Instants [s].
-        edge_height: How far the edge lies from the axis of the instrument [m]; None: that of the
-            scalpel.
     """
-    measures, of_scalpel = _measured(placement.preset)
-    path = blade_path(stroke, boxes, of_scalpel if edge_height is None else edge_height, times)
+    measures, _ = _measured(placement.preset)
+    path = blade_path(stroke, boxes, placement.edge_height, times)
     base = placement.base_position - placement.tissue_origin
     return spheres_along(measures, path, base, placement.base_yaw, placement.mount_angle)
 
 
-def stays_in_reach(
-    placement: Placement, stroke: Stroke, boxes: FloatArray, *, edge_height: float | None = None
-) -> bool:
+def stays_in_reach(placement: Placement, stroke: Stroke, boxes: FloatArray) -> bool:
     """Return whether an arm that stands somewhere reaches a stroke, with enough room in its joints.
 
     Args:
         placement: Where it stands.
         stroke: Tissue frame.
         boxes: See `place`.
-        edge_height: See `covered`.
     """
-    measures, of_scalpel = _measured(placement.preset)
-    height = of_scalpel if edge_height is None else edge_height
-    path = blade_path(stroke, boxes, height, np.linspace(0.0, stroke.duration, DENSE_SAMPLES))
+    measures, _ = _measured(placement.preset)
+    times = np.linspace(0.0, stroke.duration, DENSE_SAMPLES)
+    path = blade_path(stroke, boxes, placement.edge_height, times)
     turn = turn_about_z(placement.base_yaw)
     positions = (path.positions - (placement.base_position - placement.tissue_origin)) @ turn
     reached = reach(measures, positions, turn.T @ path.axes, placement.mount_angle)
@@ -195,37 +196,25 @@ def stays_in_reach(
 
 
 def place_beside(
-    stroke: Stroke,
-    boxes: FloatArray,
-    preset: str,
-    times: FloatArray,
-    *,
-    table: float | None,
-    others: Sequence[Spheres],
-    at_start: bool = False,
+    stroke: Stroke, preset: str, beside: Neighbours, *, at_start: bool = False
 ) -> Placement:
     """Return the place from which an arm that holds a grasper reaches, clear of other arms.
 
     Args:
         stroke: The motion of the grasper, as that of an edge from where the arm holds it to the end
             of its pads; tissue frame.
-        boxes: See `place`.
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches.
-        times: Instants at which it must reach, and be clear of the others [s].
-        table: Height of the table on which it stands, tissue frame [m]; None: of its own.
-        others: What covers the arms that stand there, at these instants.
-        at_start: Whether they are to be clear of each other at the first instant alone.
+        beside: What it stands beside.
+        at_start: Whether the arms are to be clear of each other at the first instant alone.
 
     Raises:
         UsageError: no arm has this name.
         PlacementError: no arm reaches.
     """
-    if preset != AUTO and preset not in ARMS:
-        raise unknown("arm", preset, [*ARMS, AUTO])
-    for name in ARMS if preset == AUTO else (preset,):
+    for name in _arms_to_try(preset):
         measures, _ = _measured(name)
-        path = blade_path(stroke, boxes, 0.0, times)._replace(table=table)
-        found = search_place(measures, path, others, at_start=at_start)
+        path = blade_path(stroke, beside.boxes, 0.0, beside.times)._replace(table=beside.table)
+        found = search_place(measures, path, beside.others, at_start=at_start)
         placement = _placed(found, measures, name, path)
         if placement.margin >= NEEDED_MARGIN and math.isfinite(found.score):
             return placement
@@ -247,13 +236,24 @@ def place_beside(
     )
 
 
+def _arms_to_try(preset: str) -> Sequence[str]:
+    """Return the arms that a preset stands for, smallest first.
+
+    Raises:
+        UsageError: no arm has this name.
+    """
+    if preset != AUTO and preset not in ARMS:
+        raise unknown("arm", preset, [*ARMS, AUTO])
+    return list(ARMS) if preset == AUTO else [preset]
+
+
 def _place(stroke: Stroke, boxes: FloatArray, preset: str) -> Placement:
     """Return the best place for one arm, whether or not it reaches."""
     measures, edge_height = _measured(preset)
     few, many = (np.linspace(0.0, stroke.duration, n) for n in (SAMPLES, DENSE_SAMPLES))
     found = search_place(measures, blade_path(stroke, boxes, edge_height, few))
     placement = _placed(found, measures, preset, blade_path(stroke, boxes, edge_height, many))
-    return placement._replace(blade_length=stroke.blade_length)
+    return placement._replace(blade_length=stroke.blade_length, edge_height=edge_height)
 
 
 def _placed(found: Found, measures: Geometry, preset: str, path: InstrumentPath) -> Placement:
@@ -271,6 +271,7 @@ def _placed(found: Found, measures: Geometry, preset: str, path: InstrumentPath)
         np.array([0.0, 0.0, -table]),
         reached.angles[0, 0],
         float(reached.margin.min()),
+        edge_height=0.0,
     )
 
 

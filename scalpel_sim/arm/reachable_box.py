@@ -23,6 +23,37 @@ _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (1, 1, 1), (1
 """Corners of a box in an order in which each is beside the next: 0 is low, 1 is high."""
 
 
+def reachable_part(
+    workspace: FloatArray,
+    middle: FloatArray,
+    start: BladeSegment,
+    place: Callable[[Stroke, FloatArray], PlaceT],
+    reaches: Callable[[PlaceT, Stroke], bool],
+) -> tuple[PlaceT, FloatArray]:
+    """Return the place of an arm, and the part of a workspace that it reaches from there.
+
+    Args:
+        workspace: See `tour_of`, as the next two.
+        middle: Where the middle of the instrument is at the start [m].
+        start: An edge along the instrument there.
+        place: Places the arm so that it reaches a tour of shares of its workspace, which are given
+            too; raises `PlacementError` where it cannot.
+        reaches: Whether an arm that has been placed reaches a tour.
+
+    Raises:
+        PlacementError: there is no place even for the smallest shares.
+    """
+
+    def place_for(shares: FloatArray) -> tuple[PlaceT, FloatArray]:
+        box = middle + shares * (workspace - middle)
+        return place(tour_of(box, middle, start), shares), box
+
+    found, box = placed_within(place_for)
+    return found, grown_within(
+        box, workspace, lambda larger: reaches(found, tour_of(larger, middle, start))
+    )
+
+
 def tour_of(workspace: FloatArray, middle: FloatArray, start: BladeSegment) -> Stroke:
     """Return a stroke from the start to all corners of a workspace, one a second.
 
@@ -39,23 +70,12 @@ def tour_of(workspace: FloatArray, middle: FloatArray, start: BladeSegment) -> S
     return Stroke(np.arange(float(len(poses))), poses, "live hand", is_led=True)
 
 
-def shrunk(workspace: FloatArray, middle: FloatArray, shares: FloatArray) -> FloatArray:
-    """Return the part of a workspace around the start.
-
-    Args:
-        workspace: See `tour_of`.
-        middle: Where the middle of the instrument is at the start [m].
-        shares: How much of it along each axis, shape (3,).
-    """
-    return middle + shares * (workspace - middle)
-
-
 def arm_for(preset: str, shares: FloatArray) -> str:
     """Return which arm is to reach shares of a workspace: the largest, where not all is reached.
 
     Args:
         preset: What was asked for, one of `ARMS` or `auto`.
-        shares: See `shrunk`.
+        shares: How much of it along each axis, around the start, shape (3,).
     """
     return list(ARMS)[-1] if preset == AUTO and shares.min() < 1.0 else preset
 
@@ -67,7 +87,8 @@ def placed_within(place: Callable[[FloatArray], PlaceT]) -> PlaceT:
     arms reach least and an instrument needs least, then in all directions.
 
     Args:
-        place: Places the arm so that it reaches certain shares of its workspace: see `shrunk`.
+        place: Places the arm so that it reaches certain shares of its workspace: see
+            `arm_for`.
 
     Raises:
         PlacementError: there is no place even for the smallest shares.

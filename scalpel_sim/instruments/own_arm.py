@@ -19,13 +19,7 @@ from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.placement import PlacementError
-from scalpel_sim.arm.reachable_box import (
-    SMALLEST_SHARE,
-    grown_within,
-    placed_within,
-    shrunk,
-    tour_of,
-)
+from scalpel_sim.arm.reachable_box import SMALLEST_SHARE, reachable_part
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.lacking_reach import PlaceInScene, place_of_tissue, what_it_lacks
@@ -117,6 +111,13 @@ def expect_angles(model: mujoco.MjModel) -> None:
         )
 
 
+def frame_at(pos: Sequence[float], quat: Sequence[float]) -> TissueFrame:
+    """Return the frame at a place [m] with a rotation (w, x, y, z) of any length but 0."""
+    axes, quaternion = np.empty(9), np.array(quat)
+    mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
+    return TissueFrame(axes.reshape(3, 3), np.array(pos))
+
+
 def _at_first(arm: DrivenArm) -> FloatArray:
     """Return the configuration of the first keyframe, or that of the model without one."""
     first = arm.model.key_qpos[0] if arm.model.nkey else arm.model.qpos0
@@ -204,25 +205,21 @@ def move_within(
     Raises:
         PlacementError: it does not reach even a small part of it.
     """
-    middle = 0.5 * (start.tip + start.heel)
 
-    def move_for(shares: FloatArray) -> FloatArray:
-        box = shrunk(workspace, middle, shares)
-        tour = tour_of(box, middle, start)
+    def move(tour: Stroke, shares: FloatArray) -> None:
         found = DampedLeastSquares(arm).find(_watched(tour, frame)[1])
         if not found.is_whole:
             if shares.max() <= SMALLEST_SHARE:  # the last that is tried: say what it lacks
                 move_to_start(arm, tour, frame, place)
             raise PlacementError(f"the arm '{arm.name}' does not reach the stroke")
         arm.reset(found.first)
-        return box
 
-    def reaches(box: FloatArray) -> bool:
-        poses = _watched(tour_of(box, middle, start), frame)[1]
+    def reaches(_: None, tour: Stroke) -> bool:
         solver = DampedLeastSquares(arm)
-        return solver.follow(solver.starts()[0], poses).is_whole
+        return solver.follow(solver.starts()[0], _watched(tour, frame)[1]).is_whole
 
-    return grown_within(placed_within(move_for), workspace, reaches)
+    middle = 0.5 * (start.tip + start.heel)
+    return reachable_part(workspace, middle, start, move, reaches)[1]
 
 
 def _watched(stroke: Stroke, frame: TissueFrame) -> tuple[FloatArray, list[BladeSegment]]:

@@ -1,11 +1,10 @@
 """Places of the arms of a scene in the world: the one with the blade, and those with graspers."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, Fixture, TissueFrame
@@ -18,10 +17,9 @@ from scalpel_sim.arm.placement import (
     place_if_reached,
     stays_in_reach,
 )
-from scalpel_sim.arm.reachable_box import arm_for, grown_within, placed_within, shrunk, tour_of
+from scalpel_sim.arm.reachable_box import arm_for, reachable_part
 from scalpel_sim.arm.standing import Standing, StandingFixture, Tabletop
-from scalpel_sim.errors import UsageError
-from scalpel_sim.instruments.own_arm import move_to_start, move_within, own_arm
+from scalpel_sim.instruments.own_arm import frame_at, move_to_start, move_within, own_arm
 from scalpel_sim.instruments.scene_graspers import arms_with_graspers
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.strokes.expected_force import ExpectedForce
@@ -89,14 +87,40 @@ def project_arm_in(
     Raises:
         PlacementError: there is no such place.
     """
+    boxes, preset, start = around.boxes, scene.arm.preset, stroke.start
     rooms = _rooms_of_graspers(motions, scene, around)
-    placement, held, room = _placed(
-        stroke,
-        around.boxes,
-        scene,
-        needed,
-        lambda place: _beside(place, stroke, scene, motions, around.boxes, rooms),
-    )
+    # Where a hand will lead it is not known: at the start the arms are clear of each other.
+    known = resting_stroke(start) if stroke.is_led else stroke
+
+    def beside(placement: Placement) -> tuple[Placement, list[HeldArm]]:
+        frame = TissueFrame(origin=placement.tissue_origin)
+        held = arms_with_graspers(scene.graspers, motions, boxes, frame, (placement, known), rooms)
+        return placement, held
+
+    def place_for(tour: Stroke, shares: FloatArray) -> tuple[Placement, list[HeldArm]]:
+        name = arm_for(preset, shares)
+        found = place_if_reached(tour, boxes, name, force=needed.force)
+        if found is None:
+            raise PlacementError(f"arm {name}")
+        return beside(found)
+
+    def reaches(found: tuple[Placement, list[HeldArm]], tour: Stroke) -> bool:
+        return stays_in_reach(found[0], tour, boxes)
+
+    room = None
+    if stroke.is_led:
+        wanted, middle = workspace_in(scene, start, boxes[0]), 0.5 * (start.tip + start.heel)
+        try:
+            found, room = reachable_part(wanted, middle, start, place_for, reaches)
+        except PlacementError as error:
+            raise PlacementError(
+                "no hand can lead the blade here: the arm does not reach around where the blade "
+                "starts, in the direction that it has there. Choose another scene, or a first "
+                f"stroke that begins with the blade upright ({error})"
+            ) from error
+    else:
+        found = beside(place(stroke, boxes, preset, force=needed.force))
+    placement, held = found
     frame = TissueFrame(origin=placement.tissue_origin)
     others = [*held, *_in_world(around, frame)]
     return StandingArms(placement.arm(others=others), frame, stroke, others, room)
@@ -121,7 +145,12 @@ def own_arm_in(
     """
     arm, frame = _own(scene)
     stroke = _as_long(stroke, arm.blade.length)
-    room = _moved(arm, stroke, frame, workspace_in(scene, stroke.start, around.boxes[0]))
+    room = None
+    if stroke.is_led:
+        wanted = workspace_in(scene, stroke.start, around.boxes[0])
+        room = move_within(arm, wanted, stroke.start, frame)
+    else:
+        move_to_start(arm, stroke, frame)
     rooms = _rooms_of_graspers(motions, scene, around)
     boxes = around.boxes
     others: list[Standing] = [
@@ -135,90 +164,16 @@ def own_arm_in(
     return StandingArms(arm, frame, stroke, others, room)
 
 
-def _beside(
-    placement: Placement,
-    stroke: Stroke,
-    scene: Scene,
-    motions: Sequence[GraspMotion],
-    boxes: FloatArray,
-    rooms: Sequence[FloatArray | None],
-) -> list[HeldArm]:
-    """Return the arms with graspers beside an arm of the project; see `arms_with_graspers`."""
-    frame = TissueFrame(origin=placement.tissue_origin)
-    # Where a hand will lead it is not known: at the start the arms are clear of each other.
-    known = resting_stroke(stroke.start) if stroke.is_led else stroke
-    first = placement, known
-    return arms_with_graspers(scene.graspers, motions, boxes, frame, first, rooms)
-
-
-def _placed(
-    stroke: Stroke,
-    boxes: FloatArray,
-    scene: Scene,
-    needed: ExpectedForce,
-    beside: Callable[[Placement], list[HeldArm]],
-) -> tuple[Placement, list[HeldArm], FloatArray | None]:
-    """Return where an arm of the project stands, arms beside it, and where a hand may lead it.
-
-    Args:
-        stroke: What it is to reach; of a hand, where it starts.
-        boxes: See `placement.place`.
-        scene: The scene.
-        needed: What the cut will take.
-        beside: Places the arms beside it.
-    """
-    if not stroke.is_led:
-        placement = place(stroke, boxes, scene.arm.preset, force=needed.force)
-        return placement, beside(placement), None
-    start = stroke.start
-    workspace, middle = workspace_in(scene, start, boxes[0]), 0.5 * (start.tip + start.heel)
-
-    def place_for(shares: FloatArray) -> tuple[Placement, list[HeldArm], FloatArray]:
-        box = shrunk(workspace, middle, shares)
-        tour = tour_of(box, middle, start)
-        name = arm_for(scene.arm.preset, shares)
-        found = place_if_reached(tour, boxes, name, force=needed.force)
-        if found is None:
-            raise PlacementError(f"arm {name}")
-        return found, beside(found), box
-
-    def reaches(box: FloatArray) -> bool:
-        return stays_in_reach(placement, tour_of(box, middle, start), boxes)
-
-    try:
-        placement, held, box = placed_within(place_for)
-    except PlacementError as error:
-        raise PlacementError(
-            "no hand can lead the blade here: the arm does not reach around where the blade "
-            "starts, in the direction that it has there. Choose another scene, or a first stroke "
-            f"that begins with the blade upright ({error})"
-        ) from error
-    return placement, held, grown_within(box, workspace, reaches)
-
-
-def _moved(
-    arm: DrivenArm, stroke: Stroke, frame: TissueFrame, workspace: FloatArray
-) -> FloatArray | None:
-    """Move an arm of the user's own to the start, and return where a hand may lead it."""
-    if stroke.is_led:
-        return move_within(arm, workspace, stroke.start, frame)
-    move_to_start(arm, stroke, frame)
-    return None
-
-
 def _rooms_of_graspers(
     motions: Sequence[GraspMotion], scene: Scene, around: ArmSurroundings
 ) -> list[FloatArray | None]:
     """Return where a hand is to lead each grasper; None where a script leads it."""
-    return [_room_of_grasper(motion, scene, around.boxes[0]) for motion in motions]
-
-
-def _room_of_grasper(motion: GraspMotion, scene: Scene, bounds: FloatArray) -> FloatArray | None:
-    """Return where a hand is to lead a grasper; None where a script leads it."""
-    if not motion.is_led:
-        return None
-    start = motion.stroke(HALF_PAD, HALF_PAD).start
-    return workspace_in(scene, start, bounds, ROOM_OF_GRASPER)
+    starts = [m.stroke(HALF_PAD, HALF_PAD).start if m.is_led else None for m in motions]
+    bounds = around.boxes[0]
+    return [
+        None if start is None else workspace_in(scene, start, bounds, ROOM_OF_GRASPER)
+        for start in starts
+    ]
 
 
 def _as_long(stroke: Stroke, length: float) -> Stroke:
@@ -257,46 +212,27 @@ def _own(scene: Scene, others: Sequence[Standing] = ()) -> tuple[DrivenArm, Tiss
         forward=own.forward,
         others=others,
     )
-    quaternion, axes = np.array(world.quat), np.empty(9)
-    if not quaternion.any():
-        raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
-    mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
-    return arm, TissueFrame(axes.reshape(3, 3), np.array(world.pos))
-
-
-def workspace(
-    start: BladeSegment, bounds: FloatArray, lowest: float, room: float = ROOM
-) -> FloatArray:
-    """Return the lowest and the highest place of the middle of the edge [m], shape (2, 3).
-
-    There the tip is in the body, or a little beside or above it, with the edge as at the start; the
-    start lies in it wherever it is.
-
-    Args:
-        start: The pose of the blade at the start, tissue frame; of a grasper, its pads as an edge.
-        bounds: Lowest and highest corner of the body [m], shape (2, 3).
-        lowest: Height of what lies under the body [m]; minus infinity: nothing.
-        room: How far the tip may be beside the body or above it [m].
-    """
-    low, high = bounds[0] - room, bounds[1] + room
-    low[2] = max(low[2], lowest)
-    to_middle = 0.5 * (start.heel - start.tip)
-    return np.stack([np.minimum(low, start.tip), np.maximum(high, start.tip)]) + to_middle
+    return arm, frame_at(world.pos, world.quat)
 
 
 def workspace_in(
     scene: Scene, start: BladeSegment, bounds: FloatArray, room: float = ROOM
 ) -> FloatArray:
-    """Return the workspace around the body of a scene: not under its table or floor.
+    """Return the lowest and the highest place of the middle of the edge [m], shape (2, 3).
+
+    There the tip is in the body of the scene, or a little beside or above it, with the edge as at
+    the start, and not under its table or floor; the start lies in it wherever it is.
 
     Args:
         scene: The scene.
-        start: See `workspace`, as the rest.
-        bounds: Lowest and highest corner of the body [m].
-        room: How far the tip may be beside it [m].
+        start: The pose of the blade at the start, tissue frame; of a grasper, its pads as an edge.
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+        room: How far the tip may be beside the body or above it [m].
     """
-    stops = [height for height in (scene.world.table, scene.world.floor) if height is not None]
-    return workspace(start, bounds, max(stops, default=-math.inf), room)
+    low, high = bounds[0] - room, bounds[1] + room
+    low[2] = max(low[2], scene.world.stop)
+    to_middle = 0.5 * (start.heel - start.tip)
+    return np.stack([np.minimum(low, start.tip), np.maximum(high, start.tip)]) + to_middle
 
 
 def resting_stroke(start: BladeSegment) -> Stroke:

@@ -1,21 +1,51 @@
-"""From the graspers of a scene to arms that hold them, and to what leads them."""
+"""From the graspers of a scene to arms that hold them, and to what leads them.
 
+An arm is one of the presets, or a model of the user's own.
+"""
+
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from bridge import Bridge, TissueFrame
-from scalpel_sim.arm.arm import DrivenArm
-from scalpel_sim.arm.grasper import HeldArm
-from scalpel_sim.arm.placement import AUTO, Placement, covered
+from bridge import Bridge, DeviceLimits, TissueFrame
+from scalpel_sim.arm.arm import DrivenArm, preset_spec, put_base
+from scalpel_sim.arm.grasper import (
+    FORWARD,
+    GRASPER,
+    HALF_PAD,
+    PADS_HEEL,
+    PADS_TIP,
+    SHAFT_LENGTH,
+    Grasper,
+    HeldArm,
+    add_grasper,
+    grasper_spec,
+)
+from scalpel_sim.arm.hand import Impedance, add_hand
+from scalpel_sim.arm.place_search import Spheres
+from scalpel_sim.arm.placement import (
+    AUTO,
+    SAMPLES,
+    Neighbours,
+    Placement,
+    covered,
+    place_beside,
+    stays_in_reach,
+)
+from scalpel_sim.arm.reachable_box import arm_for, reachable_part
+from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper, GripSettings
-from scalpel_sim.instruments.second_arm import (
-    model_with_grasper,
-    place_of_driven_grasper,
-    place_of_grasper,
-    preset_with_grasper,
+from scalpel_sim.instruments.lacking_reach import place_of_arm
+from scalpel_sim.instruments.own_arm import (
+    expect_angles,
+    firm_impedance,
+    frame_at,
+    move_to_start,
+    move_within,
+    own_spec,
 )
 from scalpel_sim.scene.schema import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
@@ -82,50 +112,140 @@ def arms_with_graspers(
     if first is not None:
         last = max(last, first[1].duration)
     times = np.linspace(0.0, last, WATCHED_INSTANTS)
-    table = None if first is None else -float(first[0].tissue_origin[2])
-    taken = [] if first is None else [covered(*first, boxes, times)]
+    beside = Neighbours(boxes, times)
+    if first is not None:
+        table, there = -float(first[0].tissue_origin[2]), covered(*first, boxes, times)
+        beside = beside._replace(table=table, others=(there,))
     found = []
     for grasper, motion, workspace in zip(graspers, motions, workspaces, strict=True):
         if grasper.model is None:
-            preset, reached = grasper.preset or AUTO, None
-            if workspace is None:
-                place, spheres = place_of_grasper(
-                    motion, boxes, preset, times, table=table, others=taken
-                )
-            else:
-                place, spheres, reached = place_of_driven_grasper(
-                    motion,
-                    workspace,
-                    boxes,
-                    preset,
-                    times,
-                    table=table,
-                    others=taken,
-                )
-            taken.append(spheres)
+            preset = grasper.preset or AUTO
+            place, spheres, reached = place_of_grasper(motion, preset, beside, workspace)
+            beside = beside._replace(others=(*beside.others, spheres))
             arm = preset_with_grasper(motion, place, frame, force=grasper.force, workspace=reached)
         else:
-            assert grasper.at is not None
-            base = TissueFrame(_rotation(grasper), np.array(grasper.pos or (0.0, 0.0, 0.0)))
-            model = Path(grasper.model)
-            arm = model_with_grasper(
-                motion,
-                model,
-                grasper.at,
-                base,
-                frame,
-                force=grasper.force,
-                workspace=workspace,
-            )
+            arm = model_with_grasper(motion, grasper, frame, workspace)
         found.append(arm)
     return found
 
 
-def _rotation(grasper: GrasperTable) -> FloatArray:
-    """Return how the model of an arm is turned in the frame of the tissue, shape (3, 3)."""
-    quaternion, axes = np.array(grasper.quat or (1.0, 0.0, 0.0, 0.0)), np.empty(9)
-    mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
-    return axes.reshape(3, 3)
+def place_of_grasper(
+    motion: GraspMotion, preset: str, beside: Neighbours, workspace: FloatArray | None = None
+) -> tuple[Placement, Spheres, FloatArray | None]:
+    """Return where an arm of the project stands, what covers it, and where a hand may lead it.
+
+    Where a hand leads its grasper, it is clear of other arms at the start; where hands lead them is
+    not known.
+
+    Args:
+        motion: Where the grasper goes; of a hand, where it starts.
+        preset: The arm.
+        beside: What it stands beside.
+        workspace: Where a hand is to lead it, see `HeldArm.workspace`; None: it follows its script.
+
+    Raises:
+        PlacementError: it does not reach its motion, or even a small part of the workspace.
+    """
+    path, reached = path_of_grasper(motion), None
+    if workspace is None:
+        place = place_beside(path, preset, beside)
+    else:
+
+        def place_for(tour: Stroke, shares: FloatArray) -> Placement:
+            there = beside._replace(times=np.linspace(0.0, tour.duration, SAMPLES))
+            return place_beside(tour, arm_for(preset, shares), there, at_start=True)
+
+        def reaches(place: Placement, tour: Stroke) -> bool:
+            return stays_in_reach(place, tour, beside.boxes)
+
+        middle = np.array(motion.start.at)
+        place, reached = reachable_part(workspace, middle, path.start, place_for, reaches)
+    return place, covered(place, path, beside.boxes, beside.times), reached
+
+
+def path_of_grasper(motion: GraspMotion) -> Stroke:
+    """Return a motion as that of an edge from where an arm holds it to the end of its pads."""
+    return motion.stroke(SHAFT_LENGTH, HALF_PAD)
+
+
+def preset_with_grasper(
+    motion: GraspMotion,
+    placement: Placement,
+    frame: TissueFrame,
+    *,
+    force: float | None = None,
+    workspace: FloatArray | None = None,
+) -> HeldArm:
+    """Return an arm of the project that holds a grasper, at the start of a motion.
+
+    Args:
+        motion: Where the grasper goes; its name is that of the grasper.
+        placement: Where the arm stands.
+        frame: Where the tissue lies in the world.
+        force: Largest force of the jaws [N]; None: the usual.
+        workspace: See `HeldArm.workspace`.
+    """
+    spec = preset_spec(placement.preset)
+    put_base(spec, placement.base_position, placement.base_yaw)
+    stylus, blade = spec.body("stylus"), spec.body("blade")
+    half = 0.5 * placement.mount_angle
+    place = stylus.add_frame(pos=blade.pos, quat=[math.cos(half), math.sin(half), 0.0, 0.0])
+    spec.delete(blade)
+    spec.attach(grasper_spec(spec, force), prefix=GRASPER, frame=place)
+    hand = add_hand(spec, Impedance(), GRASPER + PADS_HEEL, GRASPER + PADS_TIP, FORWARD)
+    qpos = np.append(placement.qpos, 2 * [0.5 * motion.opening(0.0)])
+    origin = frame.points_to_world(-placement.tissue_origin)
+    turned = _quaternion(frame.rotation)
+    return HeldArm(motion.name, spec, qpos, origin, turned, hand, workspace=workspace)
+
+
+def model_with_grasper(
+    motion: GraspMotion,
+    grasper: GrasperTable,
+    frame: TissueFrame,
+    workspace: FloatArray | None = None,
+) -> HeldArm:
+    """Return the arm of an MJCF file that holds a grasper, at the start of a motion.
+
+    Args:
+        motion: Where the grasper goes; its name is that of the grasper.
+        grasper: Gives the file, what of it holds the grasper, its place, and the force of the jaws.
+        frame: Where the tissue lies in the world.
+        workspace: Where a hand is to lead the middle of the pads [m]; None: a script leads it.
+
+    Raises:
+        UsageError: the file cannot be read, is no model, or has no such site or body.
+        PlacementError: the arm does not reach the whole motion.
+    """
+    assert grasper.model is not None and grasper.at is not None
+    path, at, where = Path(grasper.model), grasper.at, f"[[grasper]] '{motion.name}'"
+    base = frame_at(grasper.pos or (0.0, 0.0, 0.0), grasper.quat or (1.0, 0.0, 0.0, 0.0))
+
+    def with_grasper() -> tuple[mujoco.MjSpec, str]:
+        spec = own_spec(path)
+        return spec, add_grasper(spec, at, force=grasper.force)
+
+    try:
+        spec, prefix = with_grasper()
+        heel, tip = prefix + PADS_HEEL, prefix + PADS_TIP
+        alone = DrivenArm(spec, path.stem, DeviceLimits(), heel=heel, tip=tip, forward=FORWARD)
+        expect_angles(alone.model)
+    except ValueError as error:
+        raise UsageError(f"{where} model {path}: {error}") from error
+    tissue_in_model = TissueFrame(base.rotation.T, base.points_to_tissue(np.zeros(3)))
+    stroke = motion.stroke(HALF_PAD, HALF_PAD)
+    place = place_of_arm(where, base)
+    if workspace is None:
+        move_to_start(alone, stroke, tissue_in_model, place)
+    else:
+        workspace = move_within(alone, workspace, stroke.start, tissue_in_model, place)
+    spec, _ = with_grasper()
+    hand = add_hand(spec, firm_impedance(alone), heel, tip, FORWARD)
+    Grasper(alone.model, alone.data, prefix).put_to(motion.opening(0.0))
+    qpos = np.array(alone.data.qpos)
+    turned = _quaternion(frame.rotation @ base.rotation)
+    origin = frame.points_to_world(base.origin)
+    return HeldArm(motion.name, spec, qpos, origin, turned, hand, prefix, workspace)
 
 
 def driven_graspers(
@@ -165,3 +285,10 @@ def _grip_settings(table: GrasperTable) -> GripSettings | None:
     return GripSettings()._replace(
         **{name: value for name, value in given.items() if value is not None}
     )
+
+
+def _quaternion(rotation: FloatArray) -> FloatArray:
+    """Return a rotation as (w, x, y, z)."""
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, rotation.ravel())
+    return quaternion

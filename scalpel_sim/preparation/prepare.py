@@ -1,7 +1,6 @@
 """From a scene to a simulation: the tissue, a stroke through it, and an arm that reaches."""
 
 import logging
-import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -68,8 +67,7 @@ def prepare(
     body, tissue = link.snapshot(), link.describe()
     mesh, bounds = TetrahedralMesh(body.positions, body.tetrahedra), tissue.bounds
     table = tabletop_of(scene, bounds)
-    stops = [height for height in (scene.world.table, scene.world.floor) if height is not None]
-    stroke = stroke_through(mesh, scene.strokes, tissue.material, max(stops, default=-math.inf))
+    stroke = stroke_through(mesh, scene.strokes, tissue.material, scene.world.stop)
     if not stroke.is_led:
         check_meets(stroke, mesh)
     motions = motions_of(scene.graspers)

@@ -101,6 +101,8 @@ def check_arm(arm: ArmTable, world: WorldTable) -> None:
     if arm.model is not None:
         if arm.preset != "auto":
             raise UsageError("[arm] has a preset and a model; choose one")
+        if not any(world.quat):
+            raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
         return
     for name, table, keys in (("arm", arm, OF_OWN_ARM), ("world", world, OF_PLACE)):
         usual = type(table)()

@@ -4,6 +4,7 @@ The text below a key is its help on the command line, its comment in the files t
 --write` makes, and its line in docs/scenes.md.
 """
 
+import math
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
@@ -140,6 +141,11 @@ class WorldTable(TomlTable, kw_only=True, frozen=True):
     """Origin of the tissue in the world of an arm of your own [m]."""
     quat: FourNumbers = (1.0, 0.0, 0.0, 0.0)
     """Rotation of the tissue there: w, x, y, z."""
+
+    @property
+    def stop(self) -> float:
+        """Height of the table or the floor that stops a blade [m]; minus infinity without."""
+        return max((z for z in (self.table, self.floor) if z is not None), default=-math.inf)
 
 
 class SolverTable(TomlTable, kw_only=True, frozen=True):

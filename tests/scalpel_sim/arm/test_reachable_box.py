@@ -9,7 +9,6 @@ from scalpel_sim.arm.reachable_box import (
     arm_for,
     grown_within,
     placed_within,
-    shrunk,
     tour_of,
 )
 from tissue import BladeSegment
@@ -31,7 +30,7 @@ def placed_if(reaches):
     tried = []
 
     def place(shares):
-        tried.append(shrunk(WANTED, MIDDLE, shares))
+        tried.append(MIDDLE + shares * (WANTED - MIDDLE))
         if not reaches(tried[-1]):
             raise PlacementError("too far")
         return tried[-1]

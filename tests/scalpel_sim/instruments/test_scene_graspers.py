@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+import math
 import re
 import warnings
 from pathlib import Path
@@ -13,16 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from bridge import TissueFrame
 from scalpel_sim.arm.arm import Arm
-from scalpel_sim.arm.placement import PlacementError, covered, place
+from scalpel_sim.arm.placement import Neighbours, PlacementError, covered, place
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper
-from scalpel_sim.instruments.second_arm import (
+from scalpel_sim.instruments.scene_graspers import (
     model_with_grasper,
     path_of_grasper,
-    place_of_driven_grasper,
     place_of_grasper,
     preset_with_grasper,
 )
+from scalpel_sim.scene.schema import GrasperTable
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
 from tests.support.planned_strokes import plan_stroke
 from tissue import Tissue, block
@@ -44,12 +45,16 @@ FRAME = TissueFrame(origin=np.array([0.1, 0.2, 0.3]))
 
 
 def preset():
-    placement, _ = place_of_grasper(MOTION, BOUNDS, "auto", TIMES, table=-0.05, others=[])
+    placement, *_ = place_of_grasper(MOTION, "auto", Neighbours(BOUNDS, TIMES, -0.05))
     return preset_with_grasper(MOTION, placement, FRAME)
 
 
-def robot(path=ROBOT, at="wrist_3", pos=(0.6, 0.03, -0.1)):
-    return model_with_grasper(MOTION, path, at, TissueFrame(origin=np.array(pos)), FRAME)
+def robot(path=ROBOT, at="wrist_3", pos=(0.6, 0.03, -0.1), quat=None):
+    return model_with_grasper(MOTION, table(path, at, pos, quat), FRAME)
+
+
+def table(path=ROBOT, at="wrist_3", pos=(0.6, 0.03, -0.1), quat=None):
+    return GrasperTable(model=str(path), at=at, pos=pos, quat=quat)
 
 
 def misses_of(held, motion=MOTION):
@@ -91,17 +96,16 @@ def test_robots_of_a_public_package_hold_the_grasper(name, pos):
     if package is None or package.origin is None:
         pytest.skip("its models come with robosuite: pip install --no-deps robosuite")
     folder = Path(package.origin).parent / "models" / "assets" / "robots"
-    turned = TissueFrame(np.diag([-1.0, -1.0, 1.0]), np.array(pos))  # it faces the tissue
+    turned = (0.0, 0.0, 0.0, 1.0)  # it faces the tissue
     path = folder / name / "robot.xml"
-    misses = misses_of(model_with_grasper(MOTION, path, "right_hand", turned, FRAME))
+    misses = misses_of(robot(path, "right_hand", pos, turned))
     assert (misses[:, 0] < 1e-3).all() and (misses[:, 1] < 0.03).all()
     assert (misses[-1] < (2e-4, 0.01, 1e-4)).all()
 
 
 def test_a_robot_that_is_turned_in_the_frame_of_the_tissue_stands_so_in_the_world():
     turn = Rotation.from_rotvec([0.0, 0.0, 0.5]).as_matrix()
-    base = TissueFrame(turn, np.array([0.55, 0.1, -0.1]))
-    held = model_with_grasper(MOTION, ROBOT, "wrist_3", base, FRAME)
+    held = robot(pos=(0.55, 0.1, -0.1), quat=(math.cos(0.25), 0.0, 0.0, math.sin(0.25)))
     arm = Arm("touch", base_position=(-1.0, 0.0, 0.0), others=[held])
     model, shoulder = arm.model, arm.model.body("left_shoulder").id
     assert model.body_pos[shoulder] == pytest.approx([0.65, 0.3, 0.2 + 0.1625])
@@ -114,10 +118,9 @@ def test_a_second_arm_stands_on_the_table_of_the_first_and_clear_of_it():
     stroke = plan_stroke("straight", BODY, speed=0.06)
     first = place(stroke, BOUNDS)
     times = np.linspace(0.0, stroke.duration, 9)
-    table, there = -float(first.tissue_origin[2]), covered(first, stroke, BOUNDS, times)
-    second, spheres = place_of_grasper(
-        FROM_LEFT, BOUNDS, "auto", times, table=table, others=[there]
-    )
+    height, there = -float(first.tissue_origin[2]), covered(first, stroke, BOUNDS, times)
+    beside = Neighbours(BOUNDS, times, height, [there])
+    second, spheres, _ = place_of_grasper(FROM_LEFT, "auto", beside)
     assert second.base_position[2] >= 0.0
     assert second.tissue_origin == pytest.approx(first.tissue_origin)
     apart = np.linalg.norm(spheres.centres[:, :, None] - there.centres[:, None], axis=3)
@@ -125,11 +128,11 @@ def test_a_second_arm_stands_on_the_table_of_the_first_and_clear_of_it():
 
 
 def test_an_arm_that_reaches_only_where_the_other_is_says_so():
-    placement, _ = place_of_grasper(MOTION, BOUNDS, "touch", TIMES, table=None, others=[])
-    there = covered(placement, path_of_grasper(MOTION), BOUNDS, TIMES, edge_height=0.0)
+    placement, *_ = place_of_grasper(MOTION, "touch", Neighbours(BOUNDS, TIMES))
+    there = covered(placement, path_of_grasper(MOTION), BOUNDS, TIMES)
     everywhere = there._replace(radii=there.radii + 1.0)
     with pytest.raises(PlacementError, match="not clear of the other arm"):
-        place_of_grasper(MOTION, BOUNDS, "touch", TIMES, table=None, others=[everywhere])
+        place_of_grasper(MOTION, "touch", Neighbours(BOUNDS, TIMES, None, [everywhere]))
 
 
 ROOM = np.array([[-0.06, -0.06, 0.0], [0.3, 0.12, 0.09]])
@@ -138,15 +141,12 @@ ROOM = np.array([[-0.06, -0.06, 0.0], [0.3, 0.12, 0.09]])
 
 def led_preset():
     rest = MOTION.at_rest()
-    place, _, room = place_of_driven_grasper(
-        rest, ROOM, BOUNDS, "auto", TIMES, table=-0.05, others=[]
-    )
+    place, _, room = place_of_grasper(rest, "auto", Neighbours(BOUNDS, TIMES, -0.05), ROOM)
     return preset_with_grasper(rest, place, FRAME, workspace=room)
 
 
 def led_robot():
-    base = TissueFrame(origin=np.array([0.6, 0.03, -0.1]))
-    return model_with_grasper(MOTION.at_rest(), ROBOT, "wrist_3", base, FRAME, workspace=ROOM)
+    return model_with_grasper(MOTION.at_rest(), table(), FRAME, ROOM)
 
 
 @pytest.mark.parametrize("make", [led_preset, led_robot])
@@ -167,10 +167,8 @@ def test_an_arm_whose_grasper_a_hand_leads_is_clear_of_the_other_at_the_start():
     first = place(stroke, BOUNDS)
     at_start = np.zeros(1)
     there = covered(first, stroke, BOUNDS, at_start)
-    table = -float(first.tissue_origin[2])
-    _, spheres, _ = place_of_driven_grasper(
-        FROM_LEFT.at_rest(), ROOM, BOUNDS, "auto", at_start, table=table, others=[there]
-    )
+    beside = Neighbours(BOUNDS, at_start, -float(first.tissue_origin[2]), [there])
+    _, spheres, _ = place_of_grasper(FROM_LEFT.at_rest(), "auto", beside, ROOM)
     apart = np.linalg.norm(spheres.centres[:, :, None] - there.centres[:, None], axis=3)
     assert (apart > spheres.radii[:, None] + there.radii).all()
 
