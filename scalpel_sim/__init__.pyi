@@ -20,9 +20,9 @@ from .scene.schema import WaypointTable as WaypointTable
 from .simulation import Simulation as Simulation
 from .state import SimulationState as SimulationState
 from .strokes.kind import LyingBody as LyingBody
+from .strokes.kind import StrokeTable as StrokeTable
 from .strokes.kind import stroke_kind as stroke_kind
 from .strokes.kinds import STROKES as STROKES
-from .strokes.table import StrokeTable as StrokeTable
 from .viewer.viewer import Viewer as Viewer
 
 __all__ = [

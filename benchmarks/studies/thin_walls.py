@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.timing import TurnWatch
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.tables import compact_table
 from scalpel_sim.validate.speed.watch import SILENT

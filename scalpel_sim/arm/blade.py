@@ -2,7 +2,8 @@
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -52,11 +53,11 @@ class Blade:
         body: str | None = None,
         forward: Sequence[float] = (0.0, 0.0, -1.0),
     ) -> None:
-        heel_id = _identifier(model, mujoco.mjtObj.mjOBJ_SITE, "site", heel)
-        tip_id = _identifier(model, mujoco.mjtObj.mjOBJ_SITE, "site", tip)
+        heel_id = number_in(model, "site", heel)
+        tip_id = number_in(model, "site", tip)
         body_id = int(model.site_bodyid[tip_id])
         if body is not None:
-            body_id = _identifier(model, mujoco.mjtObj.mjOBJ_BODY, "body", body)
+            body_id = number_in(model, "body", body)
         for site, site_id in ((heel, heel_id), (tip, tip_id)):
             if model.site_bodyid[site_id] != body_id:
                 raise BladeError(
@@ -113,15 +114,35 @@ class Blade:
         _SIX.pack_into(self._applied, 0, *six)
 
 
-def _identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, word: str, name: str) -> int:
-    """Return MuJoCo's number for a name."""
-    identifier: int = mujoco.mj_name2id(model, kind, name)
-    if identifier < 0:
-        count = model.nsite if kind == mujoco.mjtObj.mjOBJ_SITE else model.nbody
-        names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
-        there = ", ".join(f"'{known}'" for known in names if known) or "none with a name"
-        raise BladeError(f"the model has no {word} '{name}'. It has: {there}")
-    return identifier
+def number_in(
+    model: mujoco.MjModel,
+    kind: Literal["body", "site"],
+    name: str,
+    error: type[ValueError] = BladeError,
+) -> int:
+    """Return MuJoCo's number of a body or a site.
+
+    Args:
+        model: The model.
+        kind: Whether it is a body or a site.
+        name: Its name.
+        error: What to raise where there is none.
+
+    Raises:
+        ValueError: `error`, with the names that there are.
+    """
+    objects = {"body": mujoco.mjtObj.mjOBJ_BODY, "site": mujoco.mjtObj.mjOBJ_SITE}
+    number = int(mujoco.mj_name2id(model, objects[kind], name))
+    if number < 0:
+        names = [getattr(model, kind)(i).name for i in range(getattr(model, f"n{kind}"))]
+        raise error(no_such(kind, name, (each for each in names if each != "world")))
+    return number
+
+
+def no_such(kind: str, name: str, names: Iterable[str]) -> str:
+    """Return that a model has no element of a name, and those that it has, for a message."""
+    there = ", ".join(f"'{each}'" for each in names if each) or "none with a name"
+    return f"the model has no {kind} '{name}'. It has: {there}"
 
 
 def _across(edge: FloatArray, forward: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from scalpel_sim.arm.blade import no_such
 from scalpel_sim.arm.free_names import free_prefix, names_in
 from scalpel_sim.arm.hand import Hand
 from scalpel_sim.arm.standing import collide_as_one_arm
@@ -78,11 +79,8 @@ def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> 
     """
     site, body = spec.site(at), spec.body(at)
     if site is None and body is None:
-        names = [each.name for each in (*spec.sites, *spec.bodies) if each.name]
-        there = ", ".join(f"'{name}'" for name in names) or "none with a name"
-        raise GrasperError(
-            f"the model has no site or body '{at}' to hold a grasper. It has: {there}"
-        )
+        names = [each.name for each in (*spec.sites, *spec.bodies)]
+        raise GrasperError(no_such("site or body", at, names))
     grasper = grasper_spec(spec, force)
     grasper.body("shaft").quat = _ALONG_FLANGE
     prefix = free_prefix(spec, names_in(grasper), GRASPER)

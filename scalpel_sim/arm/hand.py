@@ -8,6 +8,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from scalpel_sim.arm.blade import no_such
 from scalpel_sim.arm.free_names import free_prefix
 from scalpel_sim.quaternions import (
     Matrix,
@@ -91,8 +92,7 @@ def add_hand(
     """
     for name in (heel, tip):
         if spec.site(name) is None:
-            there = ", ".join(f"'{site.name}'" for site in spec.sites) or "none"
-            raise ValueError(f"the model has no site '{name}'. It has: {there}")
+            raise ValueError(no_such("site", name, (site.name for site in spec.sites)))
     ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
     along = tuple((ends[1] - ends[0]).tolist())
     quaternion = quaternion_of(_axes(along, _numbers(np.array(forward, np.float64))))

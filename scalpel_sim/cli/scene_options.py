@@ -31,7 +31,7 @@ from scalpel_sim.scene.read import (
 )
 from scalpel_sim.scene.scene import GEL, Scene, changed, given_in
 from scalpel_sim.scene.schema import BladeTable, MaterialTable
-from scalpel_sim.strokes.table import stroke_called
+from scalpel_sim.strokes.kind import stroke_called
 from scalpel_sim.tables.text_files import as_tables, is_toml_file, read_toml
 from scalpel_sim.tables.values import TomlTable
 

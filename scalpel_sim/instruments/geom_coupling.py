@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 
 from bridge import Bridge, DrivenContact, GeomLoads, GeomPoses, TissueFrame, TouchedGeoms
-from scalpel_sim.arm.blade import about_centre_of_mass
+from scalpel_sim.arm.blade import about_centre_of_mass, number_in
 from scalpel_sim.arm.collision_geoms import WORLD
-from scalpel_sim.instruments.grip import body_number, frame_of
+from scalpel_sim.instruments.grip import frame_of
 from tissue import FloatArray, Geom, IntArray, Tissue, Wrench
 
 _SHAPES: dict[int, tuple[str, int]] = {
@@ -167,7 +167,7 @@ class GeomCoupling:
 
 def _number(model: mujoco.MjModel, body: str | int) -> int:
     """Return MuJoCo's number of a body that is given by its name or number."""
-    return body_number(model, body, GeomCouplingError) if isinstance(body, str) else body
+    return number_in(model, "body", body, GeomCouplingError) if isinstance(body, str) else body
 
 
 def _geoms_of_body(model: mujoco.MjModel, body: int) -> list[int]:

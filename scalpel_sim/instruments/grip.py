@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge import Bridge, DrivenFrame, TissueFrame
-from scalpel_sim.arm.blade import about_centre_of_mass
+from scalpel_sim.arm.blade import about_centre_of_mass, number_in
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
 
@@ -63,7 +63,7 @@ class Grip:
         damping: float = 0.0,
         breaks_at: float = math.inf,
     ) -> None:
-        body_id = body_number(data.model, body, GripError)
+        body_id = number_in(data.model, "body", body, GripError)
         self._data, self._body, self._tissue = data, body_id, tissue
         self._frame = frame = frame_of(tissue, frame)
         self._views: _BodyViews | None = None
@@ -127,25 +127,6 @@ class Grip:
         if self.n_points:
             self._tissue.release(self.attachment)  # type: ignore[arg-type]  # it is of this one
         self.apply()
-
-
-def body_number(model: mujoco.MjModel, name: str, error: type[ValueError]) -> int:
-    """Return MuJoCo's number of a body.
-
-    Args:
-        model: The model.
-        name: Name of the body.
-        error: What to raise where there is none.
-
-    Raises:
-        ValueError: `error`, with the names that there are.
-    """
-    number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name))
-    if number < 0:
-        names = [model.body(i).name for i in range(1, model.nbody)]
-        there = ", ".join(f"'{each}'" for each in names if each) or "none with a name"
-        raise error(f"the model has no body '{name}'. It has: {there}")
-    return number
 
 
 def frame_of(tissue: Tissue | Bridge, frame: TissueFrame) -> TissueFrame:

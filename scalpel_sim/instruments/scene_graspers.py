@@ -10,7 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from bridge import Bridge, DeviceLimits, TissueFrame
+from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.arm import DrivenArm, preset_spec, put_base
 from scalpel_sim.arm.grasper import (
     FORWARD,
@@ -37,7 +37,7 @@ from scalpel_sim.arm.placement import (
 )
 from scalpel_sim.arm.reachable_box import arm_for, reachable_part
 from scalpel_sim.errors import UsageError
-from scalpel_sim.instruments.driven_grasper import DrivenGrasper, GripSettings
+from scalpel_sim.instruments.driven_grasper import GripSettings
 from scalpel_sim.instruments.lacking_reach import place_of_arm
 from scalpel_sim.instruments.own_arm import (
     expect_angles,
@@ -248,36 +248,7 @@ def model_with_grasper(
     return HeldArm(motion.name, spec, qpos, origin, turned, hand, prefix, workspace)
 
 
-def driven_graspers(
-    graspers: Sequence[GrasperTable],
-    motions: Sequence[GraspMotion],
-    arm: DrivenArm,
-    bridge: Bridge,
-) -> list[DrivenGrasper]:
-    """Return what leads the graspers of a scene.
-
-    Args:
-        graspers: What the scene says of them.
-        motions: Where they go, tissue frame.
-        arm: In whose model they are.
-        bridge: To the tissue that they may hold.
-    """
-    return [
-        DrivenGrasper(
-            grasper,
-            arm.data,
-            motion,
-            bridge,
-            settings=_grip_settings(table),
-            workspace=held.workspace,
-        )
-        for table, motion, grasper, held in zip(
-            graspers, motions, arm.graspers, arm.others, strict=True
-        )
-    ]
-
-
-def _grip_settings(table: GrasperTable) -> GripSettings | None:
+def grip_settings(table: GrasperTable) -> GripSettings | None:
     """Return how a grasper holds what its jaws close on; None: by friction alone."""
     if table.holds == "friction":
         return None

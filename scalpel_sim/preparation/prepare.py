@@ -10,6 +10,7 @@ from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.arm.standing import StandingFixture, Tabletop
+from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.instruments.geom_coupling import GeomCoupling
 from scalpel_sim.instruments.scene_arms import (
     ArmSurroundings,
@@ -17,7 +18,7 @@ from scalpel_sim.instruments.scene_arms import (
     project_arm_in,
     resting_stroke,
 )
-from scalpel_sim.instruments.scene_graspers import driven_graspers, motions_of
+from scalpel_sim.instruments.scene_graspers import grip_settings, motions_of
 from scalpel_sim.preparation.tissue import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import GrasperTable
@@ -121,13 +122,16 @@ def _add_graspers(
         motions: Where they go.
     """
     arm, bridge = simulation.arm, simulation.bridge
-    known: list[str | int] = [
-        arm.blade.body_id,
-        *arm.fixtures.values(),
-    ]  # the tissue has them already
+    known: list[str | int] = [arm.blade.body_id]
+    known += arm.fixtures.values()  # the tissue has them already
     simulation.coupled_bodies.append(GeomCoupling(arm.data, bridge, without=known))
-    for grasper in driven_graspers(graspers, motions, arm, bridge):
-        simulation.add(grasper)
+    for table, motion, grasper, held in zip(
+        graspers, motions, arm.graspers, arm.others, strict=True
+    ):
+        settings, room = grip_settings(table), held.workspace
+        simulation.add(
+            DrivenGrasper(grasper, arm.data, motion, bridge, settings=settings, workspace=room)
+        )
 
 
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:

@@ -1,6 +1,6 @@
 """A case: a scene whose supports, loads and blade follow tables of time, with expectations."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,6 +9,7 @@ from msgspec import Meta, field
 
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene.body import KEYS_OF_SHAPE, BodyTable
+from scalpel_sim.scene.checks import check_different
 from scalpel_sim.scene.read import read_scene_file, with_files
 from scalpel_sim.scene.schema import BladeTable, PresetMaterialTable
 from scalpel_sim.tables.problems import check_keys
@@ -201,9 +202,9 @@ def _check(case: CaseContent) -> None:
             "s; they must not get smaller in this order"
         )
     records = [TIME, *(each.name for each in case.record)]
-    _expect_different("support", (each.name for each in case.support))
-    _expect_different("load", (each.name for each in case.load))
-    _expect_different("record", records)
+    check_different("support", (each.name for each in case.support))
+    check_different("load", (each.name for each in case.load))
+    check_different("record", records)
     for support in case.support:
         _check_support(support)
     for load in case.load:
@@ -265,15 +266,6 @@ def _check_expected(expected: ExpectedTable, names: Sequence[str]) -> None:
         )
     if expected.value is not None and expected.against != TIME:
         raise UsageError(f"{where}: against belongs to a curve (file); a value has from_time")
-
-
-def _expect_different(kind: str, names: Iterable[str]) -> None:
-    """Refuse a name that two tables of a kind have."""
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise UsageError(f"two of [[{kind}]] are called {name}; choose another name for one")
-        seen.add(name)
 
 
 def _has(table: msgspec.Struct, *keys: str) -> str:

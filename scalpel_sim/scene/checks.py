@@ -2,9 +2,12 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from bridge import VirtualCoupling
@@ -147,15 +150,7 @@ def check_range(stretch: float, gravity: float, seconds: float | None) -> None:
 
 
 def check_attachment(table: AttachmentTable, where: str) -> None:
-    """Check that the keys of an attachment make sense together.
-
-    Args:
-        table: The table.
-        where: Its name as a file writes it.
-
-    Raises:
-        UsageError: they do not.
-    """
+    """Check that the keys of an attachment make sense together: see `check_rows`."""
     for key in _OF_LIGAMENT:
         if (getattr(table, key) is None) != (table.to is None):
             given, missing = (key, "to") if table.to is None else ("to", key)
@@ -186,19 +181,37 @@ def check_attachment(table: AttachmentTable, where: str) -> None:
         raise UsageError(f"{where} has times {table.times}; they begin above 0 and increase")
 
 
-def check_graspers(graspers: Sequence[GrasperTable]) -> None:
-    """Check that the keys of each grasper belong together, and that names differ.
+def check_rows(
+    kind: str, rows: Sequence[msgspec.Struct], check: Callable[[Any, str], None]
+) -> None:
+    """Check each row of an array of tables, and that names differ where rows have names.
+
+    Args:
+        kind: Name of the array.
+        rows: The rows.
+        check: Checks a row; its second argument is the name of the row, as a file writes it.
 
     Raises:
-        UsageError: they do not; the message says which.
+        UsageError: one makes no sense; the message says which.
     """
-    for i, grasper in enumerate(graspers):
-        where = f"[[grasper]] number {i + 1}"
-        _check_grasper(grasper, where)
-        _check_own_name(grasper.name, [other.name for other in graspers[:i]], where)
+    for i, row in enumerate(rows):
+        check(row, f"[[{kind}]] number {i + 1}")
+    check_different(kind, [row.name for row in rows if hasattr(row, "name")])
 
 
-def _check_grasper(grasper: GrasperTable, where: str) -> None:
+def check_different(kind: str, names: Iterable[str]) -> None:
+    """Check that no two tables of a kind have one name.
+
+    Raises:
+        UsageError: two do.
+    """
+    for name, n in Counter(names).items():
+        if n > 1:
+            raise UsageError(f"two of [[{kind}]] are called {name}; choose another name for one")
+
+
+def check_grasper(grasper: GrasperTable, where: str) -> None:
+    """Check that the keys of a grasper belong together: see `check_rows`."""
     if grasper.recorded is not None and grasper.motion:
         raise UsageError(f"{where} has a motion and a recorded one; choose one")
     if grasper.recorded is None:
@@ -226,19 +239,8 @@ def _check_motion(motion: Sequence[WaypointTable], where: str) -> None:
             raise UsageError(f"the first row of motion of {where} has no {key}")
 
 
-def check_views(views: Sequence[ViewTable]) -> None:
-    """Check that each view shows something, the right way up, and that names differ.
-
-    Raises:
-        UsageError: they do not; the message says which.
-    """
-    for i, view in enumerate(views):
-        where = f"[[view]] number {i + 1}"
-        _check_view(view, where)
-        _check_own_name(view.name, [other.name for other in views[:i]], where)
-
-
-def _check_view(view: ViewTable, where: str) -> None:
+def check_view(view: ViewTable, where: str) -> None:
+    """Check that a view shows something, the right way up: see `check_rows`."""
     distance = math.dist(view.eye, view.target)
     if distance == 0.0:
         raise UsageError(f"{where} has its eye at its target, {list(view.eye)}; move one of them")
@@ -253,8 +255,3 @@ def _check_view(view: ViewTable, where: str) -> None:
         raise UsageError(
             f"{where} looks along its up, {list(view.up)}; give another up, such as {across}"
         )
-
-
-def _check_own_name(name: str, taken: Sequence[str], where: str) -> None:
-    if name in taken:
-        raise UsageError(f"{where} has the name '{name}' of another; give each its own")

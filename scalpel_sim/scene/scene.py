@@ -16,10 +16,11 @@ from scalpel_sim.scene.body import KEYS_OF_SHAPE, GivenBody, HeldBodyTable
 from scalpel_sim.scene.checks import (
     check_arm,
     check_attachment,
-    check_graspers,
+    check_grasper,
     check_range,
+    check_rows,
     check_solver,
-    check_views,
+    check_view,
     virtual_coupling,
 )
 from scalpel_sim.scene.schema import (
@@ -32,8 +33,8 @@ from scalpel_sim.scene.schema import (
     ViewTable,
     WorldTable,
 )
+from scalpel_sim.strokes.kind import StrokeTable, stroke_called
 from scalpel_sim.strokes.scene_stroke import check_strokes
-from scalpel_sim.strokes.table import StrokeTable, stroke_called
 from scalpel_sim.tables.problems import check_keys
 from scalpel_sim.tables.values import NameOfScene, Positive, Text, TomlTable
 from tissue import MATERIALS, BladeShape, CutSettings, Material, TetrahedralMesh
@@ -93,10 +94,9 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         _ = self.cut, self.blade  # they check themselves
         check_range(self.body.stretched_by, self.world.gravity, self.seconds)
         check_arm(self.arm, self.world)
-        for i, attachment in enumerate(self.attachments):
-            check_attachment(attachment, f"[[attachment]] number {i + 1}")
-        check_graspers(self.graspers)
-        check_views(self.views)
+        check_rows("attachment", self.attachments, check_attachment)
+        check_rows("grasper", self.graspers, check_grasper)
+        check_rows("view", self.views, check_view)
 
     @cached_property
     def material(self) -> Material:

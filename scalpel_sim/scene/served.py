@@ -7,7 +7,7 @@ from msgspec import ValidationError, convert
 from bridge import LinkError, SceneView, TissueLink, sent_scene_name
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.body import GivenBody
-from scalpel_sim.scene.checks import check_views
+from scalpel_sim.scene.checks import check_rows, check_view
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.schema import ViewTable
@@ -57,7 +57,7 @@ def received_views(views: Sequence[SceneView]) -> tuple[ViewTable, ...]:
     """
     try:
         tables = tuple(convert(view._asdict(), ViewTable) for view in views)
-        check_views(tables)
+        check_rows("view", tables, check_view)
     except (ValidationError, UsageError) as error:
         raise LinkError(f"the server sends a view that cannot be used: {error}") from error
     return tables

@@ -1,8 +1,7 @@
 """Strokes: paths of a blade over time, given or planned through a body.
 
 scene_stroke  the strokes of a scene, checked and in turn
-kinds/        the kinds of strokes, a module each; kind: what each of them is
-table         the table of a stroke
+kinds/        the kinds of strokes; kind: the table of a stroke, and what each of them is
 planning      strokes along a sheet across the body; drawn: strokes along points
 stroke        the path of a blade, and its file
 """

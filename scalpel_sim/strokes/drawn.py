@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import SAMPLE, SPEED_UP_TIME, timed
 from tissue import BladeSegment, FloatArray
 

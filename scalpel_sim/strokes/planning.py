@@ -8,10 +8,9 @@ import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.expected_force import is_inside
-from scalpel_sim.strokes.kind import LyingBody
+from scalpel_sim.strokes.kind import LyingBody, StrokeTable
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
 from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
 

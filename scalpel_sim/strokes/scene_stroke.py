@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.strokes.kind import LyingBody, check_positive
+from scalpel_sim.strokes.kind import LyingBody, StrokeTable, check_positive
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.tables.problems import check_keys
 from tissue import Material, TetrahedralMesh
 

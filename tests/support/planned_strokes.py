@@ -2,10 +2,10 @@
 
 import math
 
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.kinds.incision import DRAG_SHARE
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.strokes.table import StrokeTable
 from tissue import Material
 
 PLANNED = [name for name, kind in STROKES.items() if kind.is_planned]

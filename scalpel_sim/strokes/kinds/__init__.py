@@ -1,4 +1,4 @@
-"""The kinds of strokes, a module each, which adds its own to `STROKES`. A new one is found."""
+"""The kinds of strokes: each module adds its own to `STROKES`. A new module is found."""
 
 import pkgutil
 from importlib import import_module

@@ -12,9 +12,8 @@ import math
 import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.kind import LyingBody, stroke_kind
+from scalpel_sim.strokes.kind import LyingBody, StrokeTable, stroke_kind
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.strokes.table import StrokeTable
 from scalpel_sim.strokes.timing import timed
 from tissue import BladeSegment, FloatArray, TetrahedralMesh, boundary_faces
 

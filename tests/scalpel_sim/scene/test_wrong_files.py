@@ -163,7 +163,7 @@ WRONG = {
 name = "helper"
 motion = [{ time = 0.0, at = [0.0, 0.0, 0.1], opening = 0.01 }]
 [[stroke]]""",
-        "has the name 'helper' of another",
+        "two of [[grasper]] are called helper",
     ),
     "an eye at its target": ("[0.2, -0.2, 0.2]", "[0, 0, 0]", "number 1 has its eye at its target"),
     "a view along its up": (

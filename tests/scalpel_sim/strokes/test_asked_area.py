@@ -7,6 +7,7 @@ import pytest
 
 from scalpel_sim import SCENES
 from scalpel_sim.strokes.asked_area import asked_area, first_areas
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.kinds.incision import (
     DEPTH,
     INSERTED_AT,
@@ -14,7 +15,6 @@ from scalpel_sim.strokes.kinds.incision import (
     WITHDRAWN_AT,
 )
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.strokes.table import StrokeTable
 from tests.support.planned_strokes import plan_incision, plan_stroke
 from tissue import MATERIALS, Material, Snapshot, TetrahedralMesh, block
 

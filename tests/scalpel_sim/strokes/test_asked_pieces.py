@@ -5,8 +5,8 @@ import pytest
 
 from scalpel_sim import SCENES
 from scalpel_sim.strokes.asked_pieces import asked_pieces
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.strokes.table import StrokeTable
 from tests.scalpel_sim.strokes.test_asked_area import lying
 from tests.support.planned_strokes import plan_stroke
 from tissue import Material, TetrahedralMesh, block
