@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim import Simulation, prepare
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
-from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.asked import asked_area
 from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import Piece, pieces_of

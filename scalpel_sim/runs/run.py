@@ -24,7 +24,7 @@ from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.write import relative_path, scene_text
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.asked import asked_area
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter

@@ -33,7 +33,7 @@ from scalpel_sim.runs.file_names import (
 from scalpel_sim.runs.journal import RunJournal, RunMark, RunPlan, line_of
 from scalpel_sim.runs.reserved_folder import DiskReserve, FolderLock
 from scalpel_sim.runs.resumption import Resumption
-from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
+from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter

@@ -10,9 +10,8 @@ from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.asked import asked_area, tetrahedra_at
 from scalpel_sim.strokes.kinds.incision import DEPTH, SLOPE
-from scalpel_sim.strokes.material_at import tetrahedra_at
 from scalpel_sim.validate.findings import (
     PUBLISHED,
     REGRESSION,

@@ -10,7 +10,7 @@ from scalpel_sim.arm.place_search import LINK_RADIUS
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.scene.scene import changed
-from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.asked import asked_area
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.moved_scenes import moved

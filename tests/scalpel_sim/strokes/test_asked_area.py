@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.strokes.asked_area import asked_area, first_areas
+from scalpel_sim.strokes.asked import asked_area, first_areas
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.kinds.incision import (
     DEPTH,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.strokes.asked_pieces import asked_pieces
+from scalpel_sim.strokes.asked import asked_pieces
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from tests.scalpel_sim.strokes.test_asked_area import lying

@@ -9,7 +9,7 @@ from scalpel_sim import SCENES, prepare
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.scene.scene import changed
-from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.asked import asked_area
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.kinds.incision import (
     DEPTH,

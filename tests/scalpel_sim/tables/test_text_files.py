@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.strokes.recorded_grasp import grasp_from_csv
+from scalpel_sim.strokes.grasp_motion import grasp_from_csv
 from scalpel_sim.strokes.stroke import from_csv
 from scalpel_sim.tables.text_files import read_text_file, read_toml
 from scalpel_sim.validate.cases.expected import read_curve
