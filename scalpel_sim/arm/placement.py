@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.arm.arm import ARMS, Arm
-from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.inverse_kinematics import Geometry, geometry, reach
 from scalpel_sim.arm.place_search import (
     TABLE_CLEARANCE,
@@ -88,17 +87,11 @@ class Placement(NamedTuple):
     edge_height: float
     """Distance of the edge from the axis of the instrument [m]; 0 for a grasper."""
 
-    def arm(
-        self,
-        impedance: Impedance = Impedance(),
-        others: Sequence[Standing] = (),
-    ) -> Arm:
+    def arm(self, others: Sequence[Standing] = ()) -> Arm:
         """Return an arm that stands there, with its blade at the start of the stroke.
 
         Args:
-            impedance: How firmly the hand holds the blade.
-            others: What else stands in its world: arms, each with a grasper, a
-            table, fixtures.
+            others: What else stands in its world: arms, each with a grasper, a table, fixtures.
         """
         arm = Arm(
             self.preset,
@@ -106,7 +99,6 @@ class Placement(NamedTuple):
             mount_angle=self.mount_angle,
             base_position=self.base_position,
             base_yaw=self.base_yaw,
-            impedance=impedance,
             others=others,
         )
         arm.reset(self.qpos)

@@ -152,39 +152,33 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     def settings(self) -> dict[str, Any]:
         """Return the numbers and names of the scene, for a report."""
         world, solver, arm = self.world, self.solver, self.arm
-        own = {key: getattr(arm, key) for key in ("model", "heel", "tip", "forward", "force")}
-        own |= {"torque": arm.torque, "pos": world.pos, "quat": world.quat}
+        own = _values(arm, "model", "heel", "tip", "forward", "force", "torque")
         return {
             "about": self.about,
             "material": self.material.as_keys(),
             "fixed": self.body.fixed,
             "cut": asdict(self.cut),
-            "scheme": solver.scheme,
-            "relaxation": solver.relaxation,
-            "mass_scaling": solver.mass_scaling,
-            "precision": solver.precision,
-            "threads": solver.threads,
+            **_values(solver, "scheme", "relaxation", "mass_scaling", "precision", "threads"),
             "stretch": self.body.stretched_by,
-            "gravity": world.gravity,
-            "floor": world.floor,
-            "table": world.table,
-            "table_friction": world.table_friction,
+            **_values(world, "gravity", "floor", "table", "table_friction"),
             "blade": None if self.blade is None else asdict(self.blade),
             "audit": solver.audit,
             "attachments": [given_in(attachment) for attachment in self.attachments],
             "strokes": [given_in(stroke) for stroke in self.strokes],
             "arm": arm.preset,
-            "own_arm": None if arm.model is None else own,
+            "own_arm": None if arm.model is None else own | _values(world, "pos", "quat"),
             "graspers": [given_in(grasper) for grasper in self.graspers],
             "views": [given_in(view) for view in self.views],
-            "tissue_every": arm.tissue_every,
-            "coupling": arm.coupling,
-            "coupling_stiffness": arm.coupling_stiffness,
-            "coupling_damping": arm.coupling_damping,
+            **_values(arm, "tissue_every", "coupling", "coupling_stiffness", "coupling_damping"),
             "passivity": arm.passivity,
             "seconds": self.seconds,
             "stroke": self.stroke,
         }
+
+
+def _values(table: TomlTable, *keys: str) -> dict[str, Any]:
+    """Return some keys of a table, with their values."""
+    return {key: getattr(table, key) for key in keys}
 
 
 def changed(scene: Scene, **changes: Any) -> Scene:
