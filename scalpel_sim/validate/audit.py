@@ -17,11 +17,10 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import THEORY, Check, Curve, Findings, Plot, ValidationScene
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, lines_of
 from tissue import BladeSegment, BladeShape, Energies, FloatArray
 
-_LARGEST_RESIDUAL = 0.005
-"""Largest residual, as a share of the work of the blade."""
+_LINES = lines_of("audit")
 _SPEED = 0.05
 """Speed of the blade [m/s]."""
 _FRICTION = 0.3
@@ -82,17 +81,10 @@ def audit_strokes(quick: bool) -> dict[str, AuditStroke]:
 
 def check_residual(name: str, energies: Energies) -> Check:
     """Return the check of the residual of an audit."""
-    share = energies.residual / energies.work_of_blade
-    return Check(
-        f"{name}: residual / work of the blade",
-        share,
-        -_LARGEST_RESIDUAL,
-        _LARGEST_RESIDUAL,
-        basis=THEORY,
-    )
+    return _LINES["residual"].check(name, energies.residual / energies.work_of_blade)
 
 
-def _measure(quick: bool) -> Findings:
+def measure_audit(quick: bool) -> Findings:
     """Run every stroke with a bare edge, and with a scalpel that has friction."""
     checks, plots = [], []
     for name, stroke in audit_strokes(quick).items():
@@ -123,17 +115,3 @@ def _plot(title: str, record: StrokeRecord) -> Plot:
         for name in _PLOTTED
     ]
     return Plot(title, "time [s]", "energy [mJ]", curves)
-
-
-AUDIT_SCENE = ValidationScene(
-    name="audit",
-    title="Audit of energy",
-    about=(
-        "The work of the blade, force times displacement, is compared with where it went: change "
-        "of elastic and kinetic energy, toughness × area, breaking the skin, friction, damping, "
-        "contact, changes of the mesh. Each is counted separately where it happens; the residual "
-        "is the error of the time integration. A force that does not close the audit is wrong. "
-        "Young's modulus is 10 kPa, that of a soft phantom or organ."
-    ),
-    measure=_measure,
-)

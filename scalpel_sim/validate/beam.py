@@ -27,24 +27,14 @@ from scalpel_sim.validate.bar import (
     period_of,
 )
 from scalpel_sim.validate.clamped_solid import ClampedSolid, clamped_solid
-from scalpel_sim.validate.findings import (
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, lines_of
 from tissue import FloatArray, TetrahedralMesh, Tissue, boundary_faces, fixed_nodes
 
 CELLS_ACROSS = (3, 6)
 """Cells through the thickness, of two meshes."""
+_LINES = lines_of("beam")
 _RATIOS = (0.0, 0.45)
 """Poisson's ratios."""
-_NEAR = 0.03
-"""Largest relative error of sag, stiffness and period."""
 _N_PERIODS = 2.5
 """Periods of the swing that is followed."""
 _DT = 1e-3
@@ -56,10 +46,6 @@ _N_FREE_PERIODS = 6.5
 which shift a single passage through rest by up to half a percent of a period."""
 _STEPS_IN_PERIOD = 50
 """Samples of a period: a line between two of them meets the swing at rest within 1e-4 periods."""
-_ORDER, _ORDER_TOLERANCE = 2.0, 0.25
-"""Order in the size of elements with which the error of linear elements in the energy falls, and
-how far two coarse meshes may be below. They may be above: the elements at the surface have an error
-of their own, of third order, which counts on the coarser mesh."""
 
 
 class FreeBar(NamedTuple):
@@ -133,12 +119,8 @@ def check_bar(
         whose: Whose sag and period that is.
     """
     return [
-        Check(f"{name}: {what} / {whose}", value / wanted, *within(_NEAR), basis=THEORY)
-        for what, value, wanted in (
-            ("sag under its weight", found.sag_of_weight, theory.sag_of_weight),
-            ("sag under a load at the tip", found.sag_of_load, theory.sag_of_load),
-            ("period of the swing", found.period, theory.period),
-        )
+        _LINES[key].check(name, getattr(found, key) / getattr(theory, key), whose=whose)
+        for key in ("sag_of_weight", "sag_of_load", "period")
     ]
 
 
@@ -157,7 +139,7 @@ def extrapolated(coarse: BarMotion, fine: BarMotion) -> BarMotion:
     )
 
 
-def _measure(quick: bool) -> Findings:
+def measure_beam(quick: bool) -> Findings:
     """Load, bend and release bars of two Poisson's ratios on two meshes."""
     checks, curves, notes = [], [], []
     ratios = _RATIOS[-1:] if quick else _RATIOS
@@ -274,28 +256,14 @@ def check_free_bar(name: str, coarse: FreeBar, fine: FreeBar) -> list[Check]:
     finer = f"{name}, free, {fine.across} cells across"
     to_limit = f"{name}, free, {coarse.across} and {fine.across} cells"
     ratio = fine.across / coarse.across
+    stiffness = coarse.stiffness, fine.stiffness, ratio
+    period = limit_of_period(coarse.period, fine.period, ratio)
     return [
-        Check(f"{finer}: couple / (E I curvature)", fine.stiffness, *within(_NEAR), basis=THEORY),
-        Check(f"{finer}: period / Timoshenko's", fine.period, *within(_NEAR), basis=THEORY),
-        Check(
-            f"{to_limit}: order of the error of the stiffness",
-            order(coarse.stiffness, fine.stiffness, ratio),
-            _ORDER - _ORDER_TOLERANCE,
-            math.inf,
-            basis=THEORY,
-        ),
-        Check(
-            f"{to_limit}: limit of couple / (E I curvature)",
-            limit(coarse.stiffness, fine.stiffness, ratio),
-            *within(_NEAR),
-            basis=THEORY,
-        ),
-        Check(
-            f"{to_limit}: limit of the period / Timoshenko's",
-            limit_of_period(coarse.period, fine.period, ratio),
-            *within(_NEAR),
-            basis=THEORY,
-        ),
+        _LINES["free_stiffness"].check(finer, fine.stiffness),
+        _LINES["free_period"].check(finer, fine.period),
+        _LINES["order"].check(to_limit, order(*stiffness)),
+        _LINES["limit_of_stiffness"].check(to_limit, limit(*stiffness)),
+        _LINES["limit_of_period"].check(to_limit, period),
     ]
 
 
@@ -319,34 +287,3 @@ def limit(coarse: float, fine: float, ratio: float) -> float:
 def limit_of_period(coarse: float, fine: float, ratio: float) -> float:
     """Return where a period goes: the square of a frequency is a stiffness over a mass."""
     return float(limit(coarse**-2, fine**-2, ratio) ** -0.5)
-
-
-BEAM_SCENE = ValidationScene(
-    name="beam",
-    title="A bar: sag, stiffness in bending and period",
-    about=(
-        "A bar of 10 × 3 × 3 cm is clamped at one end. It sags under its own weight, then under a "
-        "load at its tip as large as its weight, and swings when the load is let go. At a "
-        "Poisson's ratio of 0 sag and period are compared with those of Timoshenko's beam, with "
-        "rotary inertia, within 3 %. Else a clamp keeps its section from narrowing, which a beam "
-        "does not know: there the bar is compared with the clamped solid, which is computed with "
-        "quadratic hexahedra. Nothing of either is in the engine. Young's modulus is 1 MPa, higher "
-        "than that of an organ: the tip then sags by 2 % of the length, and a beam's theory is one "
-        "of small deflections. Then the same bar without "
-        "supports is bent by couples at both ends, for which E I is exact in three dimensions, "
-        "and let go. All deviation is the error of linear tetrahedra in bending. It falls with "
-        "the square of the size of elements: the observed order and the limit on an infinitely "
-        "fine mesh, by Richardson's extrapolation, are lines of their own. The mesh is a "
-        "body-centred lattice (`lattice_block`), of the kind that the organ has; a `block` of as "
-        "many cells has half the tetrahedra and errs by two to three times as much "
-        "([mesh study](mesh_study.md))."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Cowper 1966, J. Appl. Mech. 33:335",
-            "shear coefficient of a rectangular section, 10 (1 + nu) / (12 + 11 nu)",
-            is_confirmed=False,
-        )
-    ],
-)

@@ -7,26 +7,16 @@ import numpy as np
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from scalpel_sim.validate.findings import (
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, lines_of
 from tissue import FloatArray, Geom, Material, TetrahedralMesh, Tissue, block
 
+_LINES = lines_of("contact")
 _DEPTHS = [0.5e-3, 1e-3, 1.5e-3, 2e-3]
 """How deep the sphere is pressed [m]."""
 _POISSON = (0.3, 0.45)
 """Poisson's ratios of the half-space."""
 _COARSE, _FINE = 1.2e-3, 0.8e-3
 """Sizes of cells near the contact [m]."""
-_NEAR_HERTZ = 0.05
-"""Largest relative error of the force on the sphere."""
 _FRICTIONS = (0.2, 0.5, 1.0)
 """Coefficients of friction of the table."""
 _BLOCK, _CELLS = (0.04, 0.03, 0.01), (4, 3, 2)
@@ -37,10 +27,6 @@ _HELD, _SLID = 3e-5, 3e-4
 """How far the foot of the block has slid at most while it holds, and at least when it slips [m].
 Some of it slides before the rest: the pressure is largest at its front. From the one to the other
 a block that slips takes 0.1 s."""
-_NEAR_ANGLE = 1.0
-"""Largest error of the angle [degrees]."""
-_NEAR_WEIGHT = 1e-3
-"""Largest relative error of the force on the table."""
 _DT = 1e-3
 """Time step [s]."""
 RADIUS = 0.01
@@ -182,28 +168,25 @@ def tilt_table(friction: float) -> Tilt:
 
 def check_hertz(name: str, poisson_ratio: float, found: Indentation) -> list[Check]:
     """Return the checks of a sphere that was pressed in."""
+    hertz, rows = _LINES["hertz"], zip(found.depth.tolist(), found.force.tolist(), strict=True)
     return [
-        Check(f"{name}, {1e3 * depth:g} mm deep: force on the sphere / Hertz's",
-              force / hertz_force(depth, poisson_ratio), *within(_NEAR_HERTZ), basis=THEORY)
-        for depth, force in zip(found.depth.tolist(), found.force.tolist(), strict=True)
-    ]  # fmt: skip
+        hertz.check(f"{name}, {1e3 * depth:g} mm deep", force / hertz_force(depth, poisson_ratio))
+        for depth, force in rows
+    ]
 
 
 def check_tilt(friction: float, found: Tilt) -> list[Check]:
     """Return the checks of a block on a table."""
     angle = math.degrees(math.atan(friction))
-    name, bounds = f"friction {friction:g}", (angle - _NEAR_ANGLE, angle + _NEAR_ANGLE)
+    name = f"friction {friction:g}"
     return [
-        Check(f"{name}, level table: force on it / weight", found.weight, *within(_NEAR_WEIGHT),
-              basis=THEORY),
-        Check(f"{name}: angle up to which the block holds", found.holds, *bounds, basis=THEORY,
-              unit="degrees"),
-        Check(f"{name}: angle at which it slips", found.slips, *bounds, basis=THEORY,
-              unit="degrees"),
-    ]  # fmt: skip
+        _LINES["weight"].check(f"{name}, level table", found.weight),
+        _LINES["holds"].check(name, found.holds, around=angle),
+        _LINES["slips"].check(name, found.slips, around=angle),
+    ]
 
 
-def _measure(quick: bool) -> Findings:
+def measure_contact(quick: bool) -> Findings:
     """Press a sphere into half-spaces; put a block on tables and tilt them."""
     checks, curves, notes = [], [], []
     for poisson_ratio in _POISSON[1:] if quick else _POISSON:
@@ -237,28 +220,3 @@ def _of_coarse_mesh(fine: Indentation) -> str:
         f"{fine.n_tetrahedra:,} tetrahedra: {', '.join(f'{each:.3f}' for each in of_theory)} of "
         "Hertz's force"
     )
-
-
-CONTACT_SCENE = ValidationScene(
-    name="contact",
-    title="Contact with rigid geoms",
-    about=(
-        "A rigid sphere with a radius of 10 mm is pressed into a half-space of 20 kPa without "
-        "friction and comes to rest at each depth. The force must be Hertz's, 4/3 E / (1 - nu²) "
-        "sqrt(R) d^1.5, for two Poisson's ratios. The half-space is a cylinder with a radius and a "
-        "depth of 120 mm at least, with 5 to 6 cells under the radius of the contact at 2 mm, and "
-        "half as many at 0.5 mm; that it ends there makes it stiffer by about 1 %. Then a flat "
-        "block rests on a table, which bears its weight and is tilted by 3 degrees a second. The "
-        "block must hold up to the angle whose tangent is the coefficient of friction, and slip "
-        "beyond. It holds while its foot has slid by less than 0.03 mm, and slips when it has by "
-        "0.3 mm, which takes a tenth of a second, 0.3 degrees. The front slides first where "
-        "friction is high, since the block presses most there."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Johnson 1985, Contact Mechanics, section 4.2",
-            "Hertz's theory of contact: the force of a sphere on a half-space by its depth",
-        )
-    ],
-)

@@ -10,22 +10,10 @@ from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, lines_of
 from tissue import FloatArray, Wrench
 
-_LEAST_ENERGY = -1e-6
-"""Least energy of the observer [J]: below zero the arm has got out more than it put in."""
-_MOST_RETURNED = 1.0
-"""Largest share of the energy that a hand put in which it may get back, at any time."""
+_LINES = lines_of("coupling")
 _LEAST_SHARE = 0.05
 """Share of all energy put in from which on the share that came back is looked at."""
 _AFTERWARDS = 0.2
@@ -102,9 +90,7 @@ def check_least_energy(hand: str, every: int, least_energy: float) -> Check:
         every: Time between two answers of the tissue [ms].
         least_energy: Least energy of the passivity observer [J].
     """
-    name = f"the hand {hand}, the tissue answers every {every} ms: least energy of the observer"
-    least = _LEAST_ENERGY * _UJ_PER_J
-    return Check(name, least_energy * _UJ_PER_J, least, np.inf, basis=REGRESSION, unit="µJ")
+    return _LINES["observer"].check(_case(hand, every), least_energy * _UJ_PER_J)
 
 
 def check_returned(hand: str, every: int, work: FloatArray) -> Check:
@@ -119,8 +105,12 @@ def check_returned(hand: str, every: int, work: FloatArray) -> Check:
     put_in, returned = (np.cumsum(np.clip(sign * steps, 0.0, None)) for sign in (1.0, -1.0))
     counts = put_in >= _LEAST_SHARE * put_in[-1]
     largest = float((returned[counts] / put_in[counts]).max()) if put_in[-1] > 0.0 else np.inf
-    name = f"the hand {hand}, the tissue answers every {every} ms: energy returned / put in"
-    return Check(name, largest, 0.0, _MOST_RETURNED, basis=THEORY)
+    return _LINES["returned"].check(_case(hand, every), largest)
+
+
+def _case(hand: str, every: int) -> str:
+    """Return the name of a press."""
+    return f"the hand {hand}, the tissue answers every {every} ms"
 
 
 def work_on_tissue(forces: FloatArray, torques: FloatArray, poses: FloatArray) -> FloatArray:
@@ -160,7 +150,7 @@ def _axes(pose: FloatArray) -> FloatArray:
     return np.array([along, forward, np.cross(along, forward)])
 
 
-def _measure(quick: bool) -> Findings:
+def measure_coupling(quick: bool) -> Findings:
     """Press with an answer of the tissue every 1, 5, 10 and 33 ms."""
     checks, curves, notes = [], [], []
     for hand in ("lets go",) if quick else _HANDS:
@@ -179,27 +169,3 @@ def _measure(quick: bool) -> Findings:
                 curves.append(Curve(f"answer every {every} ms", time, energy * _UJ_PER_J))
     title = "Energy that a Touch has put into tissue; the hand lets go"
     return Findings(checks, [Plot(title, "time [s]", "energy [µJ]", curves)], notes)
-
-
-COUPLING_SCENE = ValidationScene(
-    name="coupling",
-    title="Coupling of an arm and tissue that answers late",
-    about=(
-        "A Touch arm at 1 kHz presses the edge against a block of 10 kPa, the stiffness of the "
-        "scene grid2, and then holds, lets go, or taps. The tissue answers every 1, 5, 10 or 33 "
-        "ms; between answers the bridge extrapolates from its last wrench and stiffness. The work "
-        "at the blade is added up from what was applied to the arm and where MuJoCo moved it: what "
-        "comes back is less than what was put in, else a hand would feel buzzing. The bridge's own "
-        "observer is a regression: its controller keeps it above zero. "
-        "`tests/system/forces/test_passive_coupling.py` has walls of up to 25 kN/m, and what "
-        "happens without any of this."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Hannaford and Ryu 2002, Time-domain passivity control of haptic interfaces",
-            "the observer and the controller",
-            is_confirmed=False,
-        )
-    ],
-)

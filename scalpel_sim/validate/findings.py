@@ -1,7 +1,13 @@
 """What a scene of the validation returns: checks with their bounds, plots, and references."""
 
+import math
+import tomllib
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import msgspec
 
 from tissue import FloatArray
 
@@ -10,17 +16,22 @@ PASS, FAIL, KNOWN = "pass", "FAIL", "known"
 explained."""
 
 
-THEORY, PUBLISHED, REGRESSION, CASE = "theory", "published", "regression", "case"
+Basis = Literal["theory", "published", "regression", "case"]
+THEORY: Basis = "theory"
+PUBLISHED: Basis = "published"
+REGRESSION: Basis = "regression"
+CASE: Basis = "case"
 """What a check compares with. `theory`: a formula or a law of conservation that is independent of
 how the engine computes the value. `published`: a figure of an experiment. `regression`: what was
 put in, as the engine's own law of it says: it shows that the engine does what it is told, and not
 that tissue does so. `case`: what the file of a case expects."""
 
+_SECTIONS = Path(__file__).with_name("sections.toml")
 LARGEST_KNOWN = 0.02
 """How far the second bounds of a known deviation may be from what was measured, as a share."""
 
 
-class Reference(NamedTuple):
+class Reference(msgspec.Struct, frozen=True):
     """A publication."""
 
     citation: str
@@ -30,7 +41,7 @@ class Reference(NamedTuple):
     """Whether the text was looked up and says so. If not, the figure is an estimate."""
 
 
-class KnownDeviation(NamedTuple):
+class KnownDeviation(msgspec.Struct, frozen=True):
     """A deviation from the bounds that has a physical reason, which is explained.
 
     What the mesh or a scheme does wrong is no such reason: it fails.
@@ -53,8 +64,8 @@ class Check(NamedTuple):
     value: float
     low: float
     high: float
-    basis: str
-    """`THEORY`, `PUBLISHED`, `REGRESSION` or `CASE`: what the bounds come from."""
+    basis: Basis
+    """What the bounds come from."""
     unit: str = ""
     known: KnownDeviation | None = None
 
@@ -66,6 +77,54 @@ class Check(NamedTuple):
         if self.known and self.known.explains(self.value):
             return KNOWN
         return FAIL
+
+
+class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A measured line of a section: a quantity, and the bounds of its value."""
+
+    name: str
+    """What is measured; words in braces are filled in."""
+    basis: Basis
+    """What the bounds come from."""
+    near: float | None = None
+    """Largest deviation of the value from 1; None where `low` and `high` are the bounds."""
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    known: KnownDeviation | None = None
+
+    def check(
+        self,
+        case: str,
+        value: float,
+        *,
+        around: float = 0.0,
+        high: float | None = None,
+        **words: str,
+    ) -> Check:
+        """Return the check of a value.
+
+        Args:
+            case: What was measured: the begin of the name.
+            value: The value.
+            around: What the bounds lie around, where they are differences.
+            high: The upper bound, where another value gives it.
+            words: Words of the name.
+        """
+        most = self.high if high is None else high
+        bounds = (self.low + around, most + around) if self.near is None else within(self.near)
+        name = f"{case}: {self.name.format(**words)}"
+        return Check(name, value, *bounds, basis=self.basis, unit=self.unit, known=self.known)
+
+
+class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is said of a scene, and the lines that are measured in it."""
+
+    title: str
+    about: str
+    """What is done, what is compared with what, and what it means for a user."""
+    lines: dict[str, Line]
+    references: list[Reference] = []
 
 
 class Curve(NamedTuple):
@@ -118,6 +177,27 @@ class ValidationScene(NamedTuple):
     measure: Callable[[bool], Findings]
     """Runs the experiment; the argument says whether to run the short version."""
     references: Sequence[Reference] = ()
+
+
+@cache
+def sections() -> dict[str, Section]:
+    """Return the sections of `sections.toml` by name, in the order of the report."""
+    content = tomllib.loads(_SECTIONS.read_text(encoding="utf-8"))
+    return msgspec.convert(_on_one_line(content), dict[str, Section])
+
+
+def _on_one_line(content: Any) -> Any:
+    """Return a table whose texts have no line breaks."""
+    if isinstance(content, dict):
+        return {key: _on_one_line(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_on_one_line(value) for value in content]
+    return " ".join(content.split()) if isinstance(content, str) else content
+
+
+def lines_of(section: str) -> dict[str, Line]:
+    """Return the measured lines of a section by their keys."""
+    return sections()[section].lines
 
 
 def within(share: float, of: float = 1.0) -> tuple[float, float]:

@@ -13,28 +13,16 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Curve, Findings, Plot, lines_of
 from tissue import MATERIALS, BladeShape, FloatArray
 
+_LINES = lines_of("gel")
 _SLOW_TOUGHNESS = 1.1
 """Toughness of gelatine of 10 % by weight, cut slowly [J/m2]."""
 _SLOW = 10e-3 / 60.0
 """Speed up to which the toughness is constant [m/s]: 10 mm/min."""
 _SLOPE = 0.5
 """Slope of the logarithm of toughness over that of speed, at higher speeds."""
-_NEAR = 0.12
-"""Largest relative error of force / depth."""
-_NEAR_LAW = 0.05
-"""The same over the toughness of the engine's own law."""
 
 _DEPTH_10 = 0.52 / 160.0
 """Depth of blade 10 [m], from its total force of 0.52 N and 0.16 N/mm."""
@@ -42,8 +30,6 @@ _FORCE_12 = 1.17
 """Force on blade 12, the largest of the four [N]."""
 _MOST_PER_DEPTH = 190.0
 """Largest force / depth of blades 10, 11, 12 and 15 [N/m]."""
-_NEAR_PHANTOM = 0.05
-"""Largest relative error of force / (toughness × depth) in the phantom."""
 _APPARENT_TOUGHNESS = 160.0
 """Apparent toughness with blade 10 [J/m2]: the one figure that is taken from the experiment."""
 _PHANTOM_STIFFNESS = 100e3
@@ -80,27 +66,20 @@ def _phantom_force_per_depth(depth: float) -> float:
     return record.steady_resistance / depth
 
 
-def _measure(quick: bool) -> Findings:
+def measure_gel(quick: bool) -> Findings:
     """Cut gelatine at several speeds, and a phantom with two blades."""
     speeds = np.array([0.1] if quick else [1.0 / 60.0, 0.03, 0.05, 0.1, 0.2])
     forces = np.array([_force_per_depth(v) for v in speeds])
     checks = [
-        Check(f"gelatine, {v * 60e3:,.0f} mm/min: force / depth over published toughness",
-             f / published_toughness(v), *within(_NEAR), basis=REGRESSION)
+        _LINES[key].check(f"gelatine, {v * 60e3:,.0f} mm/min", f / toughness(v))
+        for key, toughness in (("published", published_toughness), ("own_law", _own_toughness))
         for v, f in zip(speeds, forces, strict=True)
-    ]  # fmt: skip
-    checks += [
-        Check(f"gelatine, {v * 60e3:,.0f} mm/min: force / depth over the toughness of its own law",
-             f / _own_toughness(v), *within(_NEAR_LAW), basis=REGRESSION)
-        for v, f in zip(speeds, forces, strict=True)
-    ]  # fmt: skip
+    ]
     depth_12 = _FORCE_12 / _MOST_PER_DEPTH
     for name, depth in (("10", _DEPTH_10), ("12", depth_12))[: 1 if quick else 2]:
-        force = _phantom_force_per_depth(depth)
-        checks.append(
-            Check(f"phantom, blade {name}, {depth * 1e3:.2f} mm deep: force / (toughness × depth)",
-                 force / _APPARENT_TOUGHNESS, *within(_NEAR_PHANTOM), basis=REGRESSION)
-        )  # fmt: skip
+        share = _phantom_force_per_depth(depth) / _APPARENT_TOUGHNESS
+        case = f"phantom, blade {name}, {depth * 1e3:.2f} mm deep"
+        checks.append(_LINES["phantom"].check(case, share))
     return Findings(checks, [_plot(speeds, forces)])
 
 
@@ -119,37 +98,3 @@ def _plot(speeds: FloatArray, forces: FloatArray) -> Plot:
         "log10 of force / depth [J/m²]",
         curves,
     )
-
-
-GEL_SCENE = ValidationScene(
-    name="gel",
-    title="Force against speed and depth: gels",
-    about=(
-        "Gelatine of 10 % is cut through at several speeds, with the toughness that Forte et al. "
-        "measured with wires: constant up to 10 mm/min, and proportional to the root of speed "
-        "above. Their range is assumed to reach 100 mm/s, which the abstract does not say. The law "
-        "of the engine adds the two parts and so lies above theirs: by 10 % at 1,000 mm/min, by 4 "
-        "% at 100 mm/s, and by a factor of 2 at the knee itself. Each force is held against this "
-        "law, too. Then scalpel blades 10 and 12 are "
-        "drawn through a phantom at the depths that follow from their total force and force per "
-        "length. The toughness is the apparent one of blade 10, friction of its faces included, as "
-        "the gel is not described. All lines are regressions: the toughness that was put in comes "
-        "back, at any speed and depth. The gelatine has the preset's own 18.3 kPa. The phantom has "
-        "100 kPa: its own was not published, and a steady force does not depend on it."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Forte et al. 2015, 'Modelling and experimental characterisation of the rate dependent "
-            "fracture properties of gelatine gels' (abstract)",
-            "gelatine of 10 % by weight, wires: 1.1 J/m² up to 10 mm/min, above it a slope of 0.5 "
-            "of the logarithms",
-        ),
-        Reference(
-            "'Modeling the cutting edge geometry of scalpel blades', doi:10.1177/0954405414567928 "
-            "(abstract)",
-            "phantom gel, steady force in total and per length: blade 10 0.52 N and 0.16 N/mm, the "
-            "least; blade 12 1.17 N, blade 11 0.19 N/mm, the most",
-        ),
-    ],
-)

@@ -12,20 +12,10 @@ from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked import asked_area, tetrahedra_at
 from scalpel_sim.strokes.kinds.incision import DEPTH, SLOPE
-from scalpel_sim.validate.findings import (
-    PUBLISHED,
-    REGRESSION,
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, lines_of
 from tissue import FloatArray, Snapshot, TetrahedralMesh, liver_lobe
 
+_LINES = lines_of("incision")
 _SCENE = changed(SCENES["incision"], audit=True)
 """The organ on its underside, of liver as published; an arm draws a scalpel along it."""
 _TOUGHNESS = _SCENE.material.toughness
@@ -36,17 +26,9 @@ _FINER = 0.75
 _FIRST_CUT = 0.01
 """Area that counts as the first cut, as a share of the area asked for. From 0.5 to 3 % of it lie 2
 mm of travel."""
-_FIRST_CUT_AFTER = (5.0, 10.0)
-"""Travel to the first cut [mm]."""
 _STEADY = (0.3, 0.6, 0.9)
 """Shares of the travel: from the first on the cut is steady, and from the first to the second and
 from there to the third the blade is as far ahead."""
-_GROWS = (0.8, 1.0)
-"""How far ahead it is in the second of these ranges, per the first, where that does not grow."""
-_NEAR = 0.05
-"""Largest relative error of the force, and of the areas."""
-_MOST_APART = 0.05
-"""Largest relative difference between the two meshes."""
 _FORWARDS = 1e-5
 """Motion of the tip in a frame from which on it counts as drawn [m]: a sixth of its speed."""
 _POINTS = 9
@@ -156,18 +138,13 @@ def check_incision(name: str, found: DrawnIncision) -> list[Check]:
     begin, middle, end = _STEADY
     early, late = (found.mean(found.ahead, *r) for r in ((begin, middle), (middle, end)))
     force = found.steady_force / (_TOUGHNESS * DEPTH)
-    paid, opened = found.paid_at_end / found.opened_at_end, found.opened_at_end / found.asked
-    first = found.first_cut * _MM_PER_M
-    area = "area that opens"
     return [
-        Check(f"{name}: travel to the first cut", first, *_FIRST_CUT_AFTER, PUBLISHED, unit="mm"),
-        Check(f"{name}: blade ahead of its material, later / earlier", late / early, *_GROWS,
-              basis=THEORY),
-        Check(f"{name}: drawn force / (toughness × depth)", force, *within(_NEAR),
-              basis=REGRESSION),
-        Check(f"{name}: area paid for / {area}", paid, *within(_NEAR), basis=THEORY),
-        Check(f"{name}: {area} / area asked for", opened, *within(_NEAR), basis=THEORY),
-    ]  # fmt: skip
+        _LINES["first_cut"].check(name, found.first_cut * _MM_PER_M),
+        _LINES["ahead"].check(name, late / early),
+        _LINES["force"].check(name, force),
+        _LINES["paid"].check(name, found.paid_at_end / found.opened_at_end),
+        _LINES["opened"].check(name, found.opened_at_end / found.asked),
+    ]
 
 
 def check_meshes(coarse: DrawnIncision, fine: DrawnIncision) -> list[Check]:
@@ -177,14 +154,10 @@ def check_meshes(coarse: DrawnIncision, fine: DrawnIncision) -> list[Check]:
         "blade ahead of its material": (fine.steady_ahead, coarse.steady_ahead),
         "drawn force": (fine.steady_force, coarse.steady_force),
     }
-    return [
-        Check(f"{name}: finer mesh / mesh of the scene - 1", a / b - 1.0, -_MOST_APART,
-              _MOST_APART, basis=THEORY)
-        for name, (a, b) in pairs.items()
-    ]  # fmt: skip
+    return [_LINES["meshes"].check(name, a / b - 1.0) for name, (a, b) in pairs.items()]
 
 
-def _measure(quick: bool) -> Findings:
+def measure_incision(quick: bool) -> Findings:
     """Draw the incision in one mesh or two."""
     spacings = (1.0,) if quick else (1.0, _FINER)
     checks, found = [], []
@@ -210,34 +183,3 @@ def _measure(quick: bool) -> Findings:
     ]
     ahead = " and ".join(f"{each.steady_ahead * _MM_PER_M:.1f}" for each in found)
     return Findings(checks, plots, [f"The blade is {ahead} mm ahead of its material"])
-
-
-INCISION_SCENE = ValidationScene(
-    name="incision",
-    title="An incision in liver as published",
-    about=(
-        "An arm draws a scalpel 8 mm deep along a lobe of liver that lies on its underside, as "
-        "`scalpel-sim run incision` does, in the mesh of that scene and in a finer one. Young's "
-        "modulus is the preset's own, 4.74 kPa, with its 164 J/m² and b = 15. The tissue is "
-        "dragged along before it parts. The first cut is where the blade has paid for 1 % of the "
-        "area asked for beyond what the tip cut as it went in; the bounds are 5 to 10 mm of "
-        "travel. From then on the blade is ahead of the material that it cuts by a length that "
-        "must not grow, the force must be toughness × depth, and all of it must be the same in "
-        "both meshes. When the blade is out, the mesh has opened the area that was asked for, and "
-        "the blade has paid for the area that opened. No published figure was found of how far "
-        "ahead it is."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Moreno-Mateos and Steinmann 2025, arXiv:2507.13565, figure 2",
-            "a blade that is pressed in cuts hydrogel from 4.2 to 6.2 mm on, and meat from 9.8 to "
-            "10.7 mm; for a drawn blade, and for liver, no figure was found",
-            is_confirmed=False,
-        ),
-        Reference(
-            "Gokgol, Basdogan and Canadinc 2012, doi:10.1016/j.medengphy.2011.09.030",
-            "164 ± 6 J/m², 3 bovine livers, needles of 4 diameters",
-        ),
-    ],
-)

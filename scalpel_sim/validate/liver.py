@@ -5,20 +5,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from scalpel_sim.validate.block import StrokeRecord, block_tissue, insertion, run_stroke
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    THEORY,
-    Band,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Band, Check, Curve, Findings, Plot, lines_of
 from tissue import MATERIALS, BladeSegment, BladeShape, Energies, Material, Tissue, block
 
+_LINES = lines_of("liver")
 _LIVER = MATERIALS["liver"].material
 """As published, and stiffening."""
 _SIZE, _CELLS = (0.1, 0.08, 0.05), (10, 8, 5)
@@ -46,8 +36,6 @@ _DEEP_SHARES = (0.7, 0.95)
 """Shares of that insertion between which the cut is steady."""
 _FRICTIONS = (0.0, 0.2, 0.4)
 """Coefficients of friction of the blade."""
-_NEAR_FORCE, _NEAR_TOUGHNESS = 0.05, 0.10
-"""Largest relative errors of the force and the area, and of the toughness by two insertions."""
 
 
 class Insertions(NamedTuple):
@@ -114,14 +102,10 @@ def _insert_twice(material: Material) -> Insertions:
 def check_two_insertions(friction: float, found: Insertions) -> list[Check]:
     """Return the checks of two insertions."""
     name, toughness = f"friction {friction:g}", _LIVER.toughness
-    checks = [
-        Check(f"{name}: toughness by two insertions / toughness put in",
-              found.toughness / toughness, *within(_NEAR_TOUGHNESS), basis=REGRESSION)
-    ]  # fmt: skip
+    checks = [_LINES["toughness"].check(name, found.toughness / toughness)]
     if friction == 0.0:
         share = found.force / (toughness * 0.5 * (1.0 + found.cut))
-        force = f"{name}: force / (toughness × edge × (1 + area cut / area swept) / 2)"
-        checks.append(Check(force, share, *within(_NEAR_FORCE), basis=THEORY))
+        checks.append(_LINES["force"].check(name, share))
     return checks
 
 
@@ -134,10 +118,9 @@ def check_deep_insertion(force: float, cut: float) -> list[Check]:
     """
     name = f"friction 0, {100.0 * _DEEP:g} cm deep"
     return [
-        Check(f"{name}: area cut / area swept", cut, *within(_NEAR_FORCE), basis=THEORY),
-        Check(f"{name}: steady force / (toughness × edge)",
-              force / _LIVER.toughness, *within(_NEAR_FORCE), basis=REGRESSION),
-    ]  # fmt: skip
+        _LINES["deep_area"].check(name, cut),
+        _LINES["deep_force"].check(name, force / _LIVER.toughness),
+    ]
 
 
 def _insert_deep() -> list[Check]:
@@ -150,7 +133,7 @@ def _insert_deep() -> list[Check]:
     return check_deep_insertion(force, _cut_over_swept(record, rows))
 
 
-def _measure(quick: bool) -> Findings:
+def measure_liver(quick: bool) -> Findings:
     """Insert twice, without friction and with some."""
     checks, curves = [], []
     for friction in _FRICTIONS[:1] if quick else _FRICTIONS:
@@ -175,48 +158,3 @@ def _measure(quick: bool) -> Findings:
         bands,
     )
     return Findings(checks, [plot])
-
-
-LIVER_SCENE = ValidationScene(
-    name="liver",
-    title="Force against depth: liver",
-    about=(
-        "A scalpel with an edge of 20 mm is pushed 35 mm into a piece of liver, withdrawn, and "
-        "pushed in again at the same place: the difference of the forces is the share of cutting, "
-        "as Azar and Hayward measured it. The material is the preset's own: Young's modulus "
-        "4.74 kPa and toughness 164 J/m² as published, of an exponential law. The toughness comes "
-        "back, which is a regression. The published ranges in the plot are of other livers and "
-        "tools, and were not put in. The force rises with depth until the capsule breaks, and then "
-        "changes little, as in experiments; at the second insertion only the uncut rest and "
-        "friction resist. Until some 6 cm deep the cut is not steady: the dent of the entry, where "
-        "tissue gives way most, is made good, so that more is cut than the edge sweeps. The energy "
-        "stored in the dent pays for half of the surplus and the blade for the other half, if the "
-        "tissue is linear. An insertion of 10 cm into a deeper piece cuts what it sweeps, and its "
-        "force is toughness × edge. Not reproduced: the saw-tooth of real liver, which loads and "
-        "unloads by turns (Chanthasopeephan et al.); a continuum of one toughness has its mean. No "
-        "published curve is compared point by point: only figures from texts that could be looked "
-        "up."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Gokgol, Basdogan and Canadinc 2012, doi:10.1016/j.medengphy.2011.09.030",
-            "164 ± 6 J/m², 3 bovine livers, needles of 4 diameters",
-        ),
-        Reference(
-            "Azar and Hayward 2008, ISBMS, with the data of Maurin et al.; range after Liu et al. "
-            "2022, table 2, doi:10.1186/s10033-022-00767-4",
-            "toughness of pig liver from the difference of two insertions at the same place; 76 to "
-            "186 J/m²",
-        ),
-        Reference(
-            "Chanthasopeephan, Desai and Lau 2003 and 2006; range after Liu et al. 2022, table 2",
-            "pig liver, blade: 187 to 225 J/m²; the force is made of linear loadings and sudden "
-            "unloadings, at each of which a crack grows",
-        ),
-        Reference(
-            "Dhar et al., Int. J. Med. Res. Rev. (ijmrr 1395)",
-            "Young's modulus of liver in vivo by shear waves, 115 adults: 4.74 ± 0.91 kPa",
-        ),
-    ],
-)

@@ -12,20 +12,10 @@ from scalpel_sim.validate.block import (
     run_stroke,
     soft_material,
 )
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    KnownDeviation,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, lines_of
 from tissue import BladeShape, Energies
 
+_LINES = lines_of("puncture")
 _NARROW = 0.001
 """Length of an edge that breaks in all at once [m]: shorter than an element."""
 _WIDE = 0.02
@@ -36,17 +26,6 @@ _TOUGHNESS = 20.0
 """Toughness below the skin [J/m2]."""
 _FRICTION = 0.2
 """Coefficient of friction on the faces of the blade."""
-_NEAR = 0.10
-"""Largest relative error of the peak."""
-_LARGEST_DROP_SHARE = 0.7
-"""Largest force 10 ms after the peak, as a share of the peak, where the skin is three times as
-tough as the tissue below."""
-_BREAKS_FROM_ENDS = KnownDeviation(
-    0.779,
-    "an edge that ends within the skin bears most at its ends, where the skin is bent most: the "
-    "break begins there, at 0.4 to 0.6 of the theory of an edge that bears the same everywhere, "
-    "and runs inwards over 1.3 to 2.3 mm of depth. The peak is 0.77 to 0.79 in cells of 5 to 2 mm",
-)
 
 
 class InsertionForces(NamedTuple):
@@ -118,44 +97,31 @@ def _withdrawal_forces(record: StrokeRecord) -> WithdrawalForces:
     )
 
 
-def check_insertion(
-    name: str, found: InsertionForces, expected: float, known: KnownDeviation | None = None
-) -> list[Check]:
+def check_insertion(name: str, found: InsertionForces, expected: float) -> list[Check]:
     """Return the checks of an insertion.
 
     Args:
         name: Name of the puncture.
         found: Its forces.
         expected: Peak by theory [N].
-        known: Known deviation of the peak; then the peak alone is checked.
     """
-    checks = [
-        Check(f"{name}: peak / (toughness of the skin × edge)", found.peak / expected,
-              *within(_NEAR), basis=REGRESSION, known=known)
-    ]  # fmt: skip
-    if known is None:
-        checks += [
-            Check(f"{name}: area cut before the peak", found.area_before * 1e6, 0.0, 0.0,
-                  basis=REGRESSION, unit="mm²"),
-            Check(f"{name}: plateau / peak", found.plateau / found.peak, 0.0, 0.95,
-                  basis=REGRESSION),
-        ]  # fmt: skip
-    return checks
+    return [
+        _LINES["peak"].check(name, found.peak / expected),
+        _LINES["early_area"].check(name, found.area_before * 1e6),
+        _LINES["plateau"].check(name, found.plateau / found.peak),
+    ]
 
 
 def check_withdrawal(name: str, found: WithdrawalForces, plateau: float) -> list[Check]:
     """Return the checks of a withdrawal; `plateau` is the force of the insertion [N]."""
     return [
-        Check(f"{name}: force against the withdrawal", found.resistance, 1e-6, plateau,
-              basis=REGRESSION, unit="N"),
-        Check(f"{name}: area cut during the withdrawal", found.area * 1e6, 0.0, 0.0, basis=THEORY,
-              unit="mm²"),
-        Check(f"{name}: work besides friction / friction, withdrawal", found.excess_work,
-              -0.1, 0.1, basis=THEORY),
-    ]  # fmt: skip
+        _LINES["withdrawal"].check(name, found.resistance, high=plateau),
+        _LINES["late_area"].check(name, found.area * 1e6),
+        _LINES["excess_work"].check(name, found.excess_work),
+    ]
 
 
-def _measure(quick: bool) -> Findings:
+def measure_puncture(quick: bool) -> Findings:
     """Puncture skins of several toughnesses with a narrow edge, and one with a wide edge."""
     checks: list[Check] = []
     curves = []
@@ -164,17 +130,14 @@ def _measure(quick: bool) -> Findings:
         found = _insertion_forces(_puncture(_NARROW, skin))
         checks += check_insertion(name, found, skin * _TOUGHNESS * _NARROW)
         if skin == 3.0:
-            drop = found.after_peak / found.peak
-            checks.append(
-                Check(f"{name}: force 10 ms after the peak / peak", drop, 0.0,
-                      _LARGEST_DROP_SHARE, basis=REGRESSION)
-            )  # fmt: skip
+            checks.append(_LINES["drop"].check(name, found.after_peak / found.peak))
         curves.append(_curve(name, found.record, _NARROW))
     name = f"edge of {_WIDE * 1e3:g} mm, skin × 1.5"
     record = _puncture(_WIDE, 1.5, COARSE_CELLS if quick else FINE_CELLS)
     found = _insertion_forces(record)
     if not quick:
-        checks += check_insertion(name, found, 1.5 * _TOUGHNESS * _WIDE, known=_BREAKS_FROM_ENDS)
+        share = found.peak / (1.5 * _TOUGHNESS * _WIDE)
+        checks.append(_LINES["wide_peak"].check(name, share))
     checks += check_withdrawal(name, _withdrawal_forces(record), found.plateau)
     curves.append(_curve(name, record, _WIDE))
     plot = Plot(
@@ -190,30 +153,3 @@ def _curve(name: str, record: StrokeRecord, length: float) -> Curve:
     """Return the curve of force over depth."""
     depth = (THICKNESS - record.tip[:, 2]) * 1e3
     return Curve(name, depth, record.force[:, 2] / (_TOUGHNESS * length))
-
-
-PUNCTURE_SCENE = ValidationScene(
-    name="puncture",
-    title="Puncture and withdrawal",
-    about=(
-        "A level edge goes 12 mm into the block from above and out again. The tissue dents while "
-        "the force rises; where it reaches the toughness of the skin × the edge, the skin breaks "
-        "and the force drops to that of the tissue below and the friction of the faces. In the "
-        "withdrawal the force changes its sign, nothing is cut, and the work is that of friction. "
-        "That nothing is cut then, and where the work goes, is theory; the other lines are "
-        "regressions of the law of skin and friction. Young's modulus is 10 kPa, that of a soft "
-        "phantom or organ."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Jiang et al. 2014, J. Biomech. 47:3344",
-            "three phases of needle insertion in tissues and a phantom: deformation, insertion, "
-            "extraction",
-        ),
-        Reference(
-            "Khadem et al. 2016, doi:10.1109/LRA.2016.2528301",
-            "puncture, cutting and friction as distinct events of a needle in porcine tissue",
-        ),
-    ],
-)

@@ -9,18 +9,10 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    within,
-)
+from scalpel_sim.validate.findings import Curve, Findings, Plot, lines_of
 from tissue import BladeShape
 
+_LINES = lines_of("rate")
 _SLOW_TOUGHNESS = 10.0
 """Toughness of a slow cut, J0 [J/m2]."""
 _DOUBLING_SPEED = 0.1
@@ -31,8 +23,6 @@ _STIFFNESS = 30e3
 """Young's modulus [Pa]."""
 _WORK_TO_RUPTURE = 1e5
 """Work to rupture, W [J/m3]."""
-_NEAR = 0.05
-"""Largest relative error of the force."""
 
 
 def _theory(speed: float) -> float:
@@ -62,20 +52,19 @@ def _force_of_edge(radius: float) -> float:
     return record.steady_resistance
 
 
-def _measure(quick: bool) -> Findings:
+def measure_rate(quick: bool) -> Findings:
     """Cut at four speeds, and with edges of three radii."""
     speeds = np.array([0.05, 0.2] if quick else [0.02, 0.05, 0.1, 0.2])
     radii = np.array([50e-6] if quick else [0.0, 25e-6, 50e-6])
     fast = np.array([_force_at_speed(v) for v in speeds]) / THICKNESS
-    checks = []
-    for v, force_per_depth in zip(speeds, fast, strict=True):
-        name = f"{v * 1e3:g} mm/s: force / (toughness at that speed × depth)"
-        checks.append(Check(name, force_per_depth / _theory(v), *within(_NEAR), basis=REGRESSION))
+    checks = [
+        _LINES["speed"].check(f"{v * 1e3:g} mm/s", force_per_depth / _theory(v))
+        for v, force_per_depth in zip(speeds, fast, strict=True)
+    ]
     for radius in radii:
         theory = (_SLOW_TOUGHNESS + 2.0 * radius * _WORK_TO_RUPTURE) * THICKNESS
-        name = f"edge of {radius * 1e6:g} µm: force / ((toughness + 2 r W) × depth)"
         share = _force_of_edge(radius) / theory
-        checks.append(Check(name, share, *within(_NEAR), basis=REGRESSION))
+        checks.append(_LINES["edge"].check(f"edge of {radius * 1e6:g} µm", share))
     finely = np.linspace(0.0, speeds[-1], 100)
     curves = [
         Curve("measured", speeds * 1e3, fast),
@@ -83,25 +72,3 @@ def _measure(quick: bool) -> Findings:
     ]
     plot = Plot("Toughness by speed", "speed [mm/s]", "force / depth [N/m = J/m²]", curves)
     return Findings(checks, [plot])
-
-
-RATE_SCENE = ValidationScene(
-    name="rate",
-    title="Speed and bluntness of the edge",
-    about=(
-        "The force of a steady cut against toughness × depth, where toughness rises with the speed "
-        "of the edge, J0 (1 + (v / v0)^n); and where the edge has a radius r and tissue a work to "
-        "rupture W, which adds 2 r W. All lines are regressions: the law of the engine comes back. "
-        "Young's modulus is 30 kPa and not an organ's: the block hardly dents, so that 40 mm are "
-        "enough for a steady cut."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Zhang and Hutchens 2021, Soft Matter 17:6728",
-            "the energy that cutting takes is linear in the radius of the edge; the slope is of "
-            "the order of twice the work to rupture",
-            is_confirmed=False,
-        )
-    ],
-)

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.validate.block import CUT_X, block_tissue, edge_at, soft_material
-from scalpel_sim.validate.findings import THEORY, Check, Findings, ValidationScene
+from scalpel_sim.validate.findings import Check, Findings, lines_of
 from tissue import BladeSegment, BladeShape, BladeSweep, FloatArray, Tissue
 
-_LARGEST = 1e-9
-"""Largest imbalance of forces [N] and of torques [N m]."""
+_LINES = lines_of("reaction")
 _DT = 1e-4
 """Time step [s]: short, since the time integration keeps angular momentum only to an error that
 shrinks with the step."""
@@ -100,23 +99,19 @@ def _momenta(tissue: Tissue) -> tuple[FloatArray, FloatArray]:
 def check_balance(law: str, found: Balance) -> list[Check]:
     """Return the checks of a cut."""
     changed = found.mesh_changed > 0.0
-    in_same_mesh = float(found.angular_momentum[~changed].max())
-    in_changed_mesh = float(found.angular_momentum[changed].max(initial=0.0))
-    angular = f"{law}: torque + change of angular momentum"
+    columns = {
+        "forces": found.forces,
+        "momentum": found.momentum,
+        "angular_momentum": found.angular_momentum[~changed],
+        "changed_mesh": found.angular_momentum[changed],
+        "contacts": found.contacts,
+    }
     return [
-        Check(f"{law}: force on blade + on tissue", float(found.forces.max()), 0.0, _LARGEST,
-              basis=THEORY, unit="N"),
-        Check(f"{law}: force on blade + change of momentum", float(found.momentum.max()), 0.0,
-              _LARGEST, basis=THEORY, unit="N"),
-        Check(angular, in_same_mesh, 0.0, _LARGEST, basis=THEORY, unit="N m"),
-        Check(f"{angular}, in steps that change the mesh", in_changed_mesh, 0.0, _LARGEST,
-              basis=THEORY, unit="N m"),
-        Check(f"{law}: torque of contacts + wrench", float(found.contacts.max()), 0.0, _LARGEST,
-              basis=THEORY, unit="N m"),
-    ]  # fmt: skip
+        _LINES[key].check(law, float(column.max(initial=0.0))) for key, column in columns.items()
+    ]
 
 
-def _measure(quick: bool) -> Findings:
+def measure_reaction(quick: bool) -> Findings:
     """Cut a free block under both laws, with friction and side load."""
     checks, notes = [], []
     laws: tuple[str, ...] = ("neo_hookean",) if quick else ("neo_hookean", "springs")
@@ -129,17 +124,3 @@ def _measure(quick: bool) -> Findings:
             f"mesh changed in {int(found.mesh_changed.sum())} of them"
         )
     return Findings(checks, notes=notes)
-
-
-REACTION_SCENE = ValidationScene(
-    name="reaction",
-    title="Action and reaction",
-    about=(
-        "A block that nothing holds is cut along a wavy line by a scalpel with friction. In each "
-        "step of 0.1 ms the force and the torque on the blade are compared with the change of the "
-        "momentum and the angular momentum of the block's nodes, which is computed without the "
-        "blade. If they differ, the arm does not feel what acts on the tissue. Young's modulus is "
-        "10 kPa, that of a soft phantom or organ."
-    ),
-    measure=_measure,
-)

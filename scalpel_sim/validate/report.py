@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.console import Console
@@ -212,7 +213,7 @@ def _scene_entry(run: SceneRun) -> dict[str, Any]:
         "seconds": round(run.seconds, 1),
         "lines": [_check_entry(check) for check in run.findings.checks],
         "notes": list(run.findings.notes),
-        "sources": [reference._asdict() for reference in scene.references],
+        "sources": [msgspec.to_builtins(reference) for reference in scene.references],
     }
 
 

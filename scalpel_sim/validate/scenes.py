@@ -1,45 +1,47 @@
 """The scenes of the validation, in the order in which they are reported."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from scalpel_sim.errors import unknown
-from scalpel_sim.validate.audit import AUDIT_SCENE
-from scalpel_sim.validate.beam import BEAM_SCENE
-from scalpel_sim.validate.contact import CONTACT_SCENE
-from scalpel_sim.validate.coupling import COUPLING_SCENE
-from scalpel_sim.validate.findings import ValidationScene
-from scalpel_sim.validate.gel import GEL_SCENE
-from scalpel_sim.validate.incision import INCISION_SCENE
-from scalpel_sim.validate.liver import LIVER_SCENE
-from scalpel_sim.validate.puncture import PUNCTURE_SCENE
-from scalpel_sim.validate.rate import RATE_SCENE
-from scalpel_sim.validate.reaction import REACTION_SCENE
-from scalpel_sim.validate.slicing import SLICING_SCENE
-from scalpel_sim.validate.spine import SPINE_SCENE
-from scalpel_sim.validate.steady import STEADY_SCENE
-from scalpel_sim.validate.stretch import STRETCH_SCENE, TENSION_SCENE
-from scalpel_sim.validate.symmetry import SYMMETRY_SCENE
+from scalpel_sim.validate.audit import measure_audit
+from scalpel_sim.validate.beam import measure_beam
+from scalpel_sim.validate.contact import measure_contact
+from scalpel_sim.validate.coupling import measure_coupling
+from scalpel_sim.validate.findings import Findings, ValidationScene, sections
+from scalpel_sim.validate.gel import measure_gel
+from scalpel_sim.validate.incision import measure_incision
+from scalpel_sim.validate.liver import measure_liver
+from scalpel_sim.validate.puncture import measure_puncture
+from scalpel_sim.validate.rate import measure_rate
+from scalpel_sim.validate.reaction import measure_reaction
+from scalpel_sim.validate.slicing import measure_slicing
+from scalpel_sim.validate.spine import measure_spine
+from scalpel_sim.validate.steady import measure_steady
+from scalpel_sim.validate.stretch import measure_stretch, measure_tension
+from scalpel_sim.validate.symmetry import measure_symmetry
+
+_MEASURES: dict[str, Callable[[bool], Findings]] = {
+    "audit": measure_audit,
+    "beam": measure_beam,
+    "contact": measure_contact,
+    "coupling": measure_coupling,
+    "gel": measure_gel,
+    "incision": measure_incision,
+    "liver": measure_liver,
+    "puncture": measure_puncture,
+    "rate": measure_rate,
+    "reaction": measure_reaction,
+    "slicing": measure_slicing,
+    "spine": measure_spine,
+    "steady": measure_steady,
+    "stretch": measure_stretch,
+    "symmetry": measure_symmetry,
+    "tension": measure_tension,
+}
 
 VALIDATION_SCENES: dict[str, ValidationScene] = {
-    scene.name: scene
-    for scene in (
-        BEAM_SCENE,
-        STRETCH_SCENE,
-        STEADY_SCENE,
-        SYMMETRY_SCENE,
-        RATE_SCENE,
-        SLICING_SCENE,
-        PUNCTURE_SCENE,
-        SPINE_SCENE,
-        REACTION_SCENE,
-        CONTACT_SCENE,
-        AUDIT_SCENE,
-        COUPLING_SCENE,
-        LIVER_SCENE,
-        INCISION_SCENE,
-        GEL_SCENE,
-        TENSION_SCENE,
-    )
+    name: ValidationScene(name, each.title, each.about, _MEASURES[name], each.references)
+    for name, each in sections().items()
 }
 
 

@@ -13,20 +13,10 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    Check,
-    Curve,
-    Findings,
-    KnownDeviation,
-    Plot,
-    Reference,
-    ValidationScene,
-    farthest_from_one,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, farthest_from_one, lines_of
 from tissue import FloatArray
 
+_LINES = lines_of("slicing")
 SLICING_TOUGHNESS = 20.0
 """Toughness of the block [J/m2]."""
 _STIFFNESS = 30e3
@@ -35,14 +25,6 @@ _HELD = "left,right,bottom"
 """Sides that are held: the bottom too, so that the block is not drawn down with the edge."""
 _PLACES = (CUT_X, 0.0187, 0.0225)
 """Positions of the cuts across the block [m]: three places across an element."""
-_NEAR = 0.05
-"""Largest relative error of either force."""
-_CHATTERS = KnownDeviation(
-    1.162,
-    "above a ratio of 1 the force along the edge falls as the edge slides faster, so that slow "
-    "slicing of tissue with little damping chatters, here at 75 Hz: the mean normal force is then "
-    "above that of a steady motion",
-)
 _SLOW, SLICING_SPEED = 0.02, 0.05
 """Speeds across the edge [m/s]."""
 
@@ -81,7 +63,6 @@ def check_slicing(
     speed: float,
     measured: Sequence[SlicingForces],
     toughness: float,
-    known: KnownDeviation | None = None,
 ) -> list[Check]:
     """Return the checks of the worst of several slicing cuts.
 
@@ -90,21 +71,18 @@ def check_slicing(
         speed: Speed across the edge [m/s].
         measured: The cuts.
         toughness: Toughness of the block [J/m2].
-        known: Known deviation of the normal force.
     """
     theory = _normal_force(toughness, ratio)
     name = f"ratio {ratio:g}, {speed * 1e3:g} mm/s"
     across = farthest_from_one([each.across / theory for each in measured])
-    normal = f"{name}: normal force over theory"
-    checks = [Check(normal, across, *within(_NEAR), basis=REGRESSION, known=known)]
+    checks = [_LINES["slow" if speed == _SLOW else "normal"].check(name, across)]
     if ratio > 0.0:
         along = farthest_from_one([each.along / (ratio * theory) for each in measured])
-        tangential = f"{name}: force along the edge over theory"
-        checks.append(Check(tangential, along, *within(_NEAR), basis=REGRESSION))
+        checks.append(_LINES["along"].check(name, along))
     return checks
 
 
-def _measure(quick: bool) -> Findings:
+def measure_slicing(quick: bool) -> Findings:
     """Cut with ratios of 0, 0.5, 1 and 2 of the speed along the edge to that across it."""
     ratios = (0.0, 1.0) if quick else (0.0, 0.5, 1.0, 2.0)
     places = _PLACES[:1] if quick else _PLACES
@@ -116,7 +94,7 @@ def _measure(quick: bool) -> Findings:
         at_first.append(measured[0])
     if not quick:
         slow = [cut_by_slicing(2.0, _SLOW)]
-        checks += check_slicing(2.0, _SLOW, slow, SLICING_TOUGHNESS, _CHATTERS)
+        checks += check_slicing(2.0, _SLOW, slow, SLICING_TOUGHNESS)
     return Findings(checks, [_plot(np.array(ratios), np.array(at_first))])
 
 
@@ -131,27 +109,3 @@ def _plot(ratios: FloatArray, measured: FloatArray) -> Plot:
         Curve("", finely, finely * theory, is_theory=True),
     ]
     return Plot("Slicing", "speed along the edge / speed across it", "force [N]", curves)
-
-
-SLICING_SCENE = ValidationScene(
-    name="slicing",
-    title="Slicing against pressing",
-    about=(
-        "The edge is drawn along itself while it cuts. All work goes into area, so that with a "
-        "ratio xi of the two speeds the normal force is toughness × depth / (1 + xi²), and the "
-        "force along the edge xi times as much: at 45 degrees (xi = 1) the normal force is half "
-        "that of pressing, which is why one slices. The samples of the edge slip along their pull, "
-        "which yields this theory: the lines are regressions of that law. Young's modulus is 30 "
-        "kPa and not an organ's: the block hardly dents, so that 40 mm are enough for a steady "
-        "cut."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Atkins, Xu and Jeronimidis 2004, J. Mater. Sci. 39:2761; Atkins, PMC4843631",
-            "the two forces as functions of the slice/push ratio, and experiments with cheddar "
-            "and salami that follow them",
-            is_confirmed=False,
-        )
-    ],
-)

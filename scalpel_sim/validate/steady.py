@@ -14,20 +14,10 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import (
-    REGRESSION,
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    farthest_from_one,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, farthest_from_one, lines_of
 from tissue import Material, block
 
+_LINES = lines_of("steady")
 STEADY_YOUNG_MODULUS = 30e3
 """Young's modulus [Pa], high enough for neo-Hookean tetrahedra of both meshes and all toughnesses
 (`tissue.blade.toughness.TOUGHEST`): at 160 J/m2 toughness over modulus is 5.3 mm, and the node size
@@ -47,14 +37,6 @@ _TOUGHNESSES: dict[str, tuple[float, ...]] = {
 """Toughnesses of the block [J/m2], by law."""
 _STIFFENING = 15.0
 """b of the exponential law: that of the tissues by name."""
-_NEAR = 0.05
-"""Largest relative error of the force."""
-_LARGEST_RIPPLE = 0.05
-"""Largest standard deviation of the force over its mean."""
-_LOWEST = 0.9
-"""Lowest force over its mean: how far it may dip where an element opens."""
-_MOST_APART = 0.05
-"""Largest relative difference between the forces on the two meshes."""
 STEADY_CUTS = ((0.02, 0.1), (0.0187, 0.2), (0.0225, 0.1))
 """Positions of the cuts across the block [m], the first along a plane of both meshes and the others
 between their planes; and speeds [m/s]."""
@@ -101,17 +83,14 @@ def check_steady_cuts(name: str, measured: Sequence[SteadyCut], toughness: float
         toughness: Toughness of the block [J/m2].
     """
     shares = [each.force / (toughness * THICKNESS) for each in measured]
-    worst = farthest_from_one(shares)
-    ripple = max(each.ripple for each in measured)
-    lowest = min(each.lowest for each in measured)
     return [
-        Check(f"{name}: force / (toughness × depth)", worst, *within(_NEAR), basis=REGRESSION),
-        Check(f"{name}: ripple", ripple, 0.0, _LARGEST_RIPPLE, basis=THEORY),
-        Check(f"{name}: lowest force / mean", lowest, _LOWEST, 1.0, basis=THEORY),
+        _LINES["force"].check(name, farthest_from_one(shares)),
+        _LINES["ripple"].check(name, max(each.ripple for each in measured)),
+        _LINES["lowest"].check(name, min(each.lowest for each in measured)),
     ]
 
 
-def _measure(quick: bool) -> Findings:
+def measure_steady(quick: bool) -> Findings:
     """Cut at several toughnesses, speeds and positions, on two meshes, under three laws."""
     cuts = STEADY_CUTS[2:] if quick else STEADY_CUTS
     checks, curves = [], []
@@ -127,8 +106,7 @@ def _measure(quick: bool) -> Findings:
                 if law == "neo_hookean":
                     curves += _curves(measured[-1].record, toughness, cells)
             apart = float(means[1] / means[0] - 1.0)
-            name = f"{law}, {toughness:g} J/m²: force in the fine mesh / in the coarse mesh - 1"
-            checks.append(Check(name, apart, -_MOST_APART, _MOST_APART, basis=THEORY))
+            checks.append(_LINES["meshes"].check(f"{law}, {toughness:g} J/m²", apart))
     title = f"Steady cuts through {THICKNESS * 1e3:g} mm of neo-Hookean solid"
     plot = Plot(title, "edge along the block [mm]", "force [N]", curves)
     return Findings(checks, [plot])
@@ -149,28 +127,3 @@ def _curves(record: StrokeRecord, toughness: float, cells: tuple[int, int, int])
         return [curve]
     theory = np.full(2, toughness * THICKNESS)
     return [curve, Curve("", x[[0, -1]], theory, is_theory=True)]
-
-
-STEADY_SCENE = ValidationScene(
-    name="steady",
-    title="Steady cutting force",
-    about=(
-        "An upright edge cuts through a block of 100 mm that is held left and right. Once the dent "
-        "of its entry is made good, the mean force is compared with toughness × depth: all work "
-        "goes into area. The force must depend on neither speed nor mesh, else a policy learns the "
-        "mesh. Each value is the worst of three cuts, one along a plane of the mesh and two "
-        "between planes, at 100 and 200 mm/s; ripple is the standard deviation of the force over "
-        "its mean. Young's modulus is 30 kPa, at which tetrahedra bear these toughnesses; springs "
-        "bear the two lowest. That the toughness comes back is a regression; that speed, place and "
-        "mesh change nothing is not."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Mahvash and Hayward 2001, Haptics-e 2(3)",
-            "work of the tool = toughness × area + change of elastic energy; in steady cutting the "
-            "force is toughness × width, whatever the stiffness",
-            is_confirmed=False,
-        )
-    ],
-)

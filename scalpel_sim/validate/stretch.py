@@ -7,18 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from scalpel_sim.validate.findings import (
-    PUBLISHED,
-    THEORY,
-    Check,
-    Curve,
-    Findings,
-    Plot,
-    Reference,
-    ValidationScene,
-    farthest_from_one,
-    within,
-)
+from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, farthest_from_one, lines_of
 from tissue import (
     MATERIALS,
     Exponential,
@@ -31,6 +20,7 @@ from tissue import (
     fixed_nodes,
 )
 
+_LINES = lines_of("stretch")
 _SIZE, _CELLS = (0.04, 0.02, 0.02), (8, 4, 4)
 """Sides of the bar [m], and cells along them."""
 _STIFFNESS = 10e3
@@ -43,8 +33,6 @@ _N_STEPS, _DT = 400, 1e-3
 """Steps of the stretch, and their length [s]."""
 _EVERY = 40
 """Steps between two points of the curve, at which the bar comes to rest."""
-_NEAR = 0.01
-"""Largest relative error of force and width."""
 
 _BAR = Material(_STIFFNESS, poisson_ratio=_RATIO, law="neo_hookean", viscous_damping=50.0)
 """The bar that does not stiffen; waves in it die away."""
@@ -152,20 +140,14 @@ def stretched_bar(material: Material, longest: float = _LONGEST) -> UniaxialStre
 
 def check_stretch(name: str, found: UniaxialStretch, theory: UniaxialStretch) -> list[Check]:
     """Return the checks of a bar: the worst of its points."""
-    checks = []
-    for what, ours, wanted in (
-        ("force", found.stress, theory.stress),
-        ("width", found.width, theory.width),
-    ):
-        worst = farthest_from_one((ours / wanted).tolist())
-        checks.append(
-            Check(f"{name}, to twice its length: {what} / formula", worst, *within(_NEAR),
-                  basis=THEORY)
-        )  # fmt: skip
-    return checks
+    shares = {"force": found.stress / theory.stress, "width": found.width / theory.width}
+    return [
+        _LINES[key].check(f"{name}, to twice its length", farthest_from_one(share.tolist()))
+        for key, share in shares.items()
+    ]
 
 
-def _measure(quick: bool) -> Findings:
+def measure_stretch(quick: bool) -> Findings:
     """Stretch a bar of each law."""
     checks, curves = [], []
     laws: tuple[str, ...] = ("neo_hookean",) if quick else tuple(BARS)
@@ -179,29 +161,6 @@ def _measure(quick: bool) -> Findings:
     title = "Bars of 10 kPa, stretched to twice their length"
     plot = Plot(title, "length / length at rest", "force / section at rest [kPa]", curves)
     return Findings(checks, [plot])
-
-
-STRETCH_SCENE = ValidationScene(
-    name="stretch",
-    title="Large stretch of each law",
-    about=(
-        "A bar is stretched to twice its length. The force on its support and the width of its "
-        "middle are compared with those that follow from the energy of the law by hand, at ten "
-        "stretches of which the worst is shown. Young's modulus is 10 kPa, as soft as an organ; "
-        "each force is compared relative to it. Law springs has no such formula. An exponential "
-        "law with b = 1.5 in place of 1, thirty times as stiff at the end, became unstable on the "
-        "way."
-    ),
-    measure=_measure,
-    references=[
-        Reference(
-            "Smith, de Goes and Kim 2018, ACM Trans. Graph. 37:12",
-            "energy of the stable neo-Hookean law",
-        ),
-        Reference("Demiray 1972, J. Biomech. 5:309", "energy of the exponential law"),
-        Reference("Yeoh 1990, Rubber Chem. Technol. 63:792", "energy of Yeoh's law"),
-    ],
-)
 
 
 MEASURED = {
@@ -219,47 +178,19 @@ MEASURED = {
 """Strain of Ecoflex 00-30, and force over the section at rest [Pa]: the rows of the file at these
 strains."""
 
-_NEAR_CURVE = 0.05
-"""Largest relative error of a point. One specimen was pulled: what others would scatter by is not
-in the file, and neighbouring rows of it by 2 %."""
 
-
-def _measure_tension(quick: bool) -> Findings:
+def measure_tension(quick: bool) -> Findings:
     """Pull a bar of silicone, and compare it with the curve at each of its points."""
     found = stretched_bar(MATERIALS["silicone"].material, longest=1.0 + max(MEASURED))
     measured = np.array(list(MEASURED.values()))
+    line = lines_of("tension")["force"]
     checks = [
-        Check(f"silicone, longer by {strain:.0%}: force / measured force", ours / published,
-              *within(_NEAR_CURVE), basis=PUBLISHED)
+        line.check(f"silicone, longer by {strain:.0%}", ours / published)
         for strain, ours, published in zip(MEASURED, found.stress, measured, strict=True)
-    ]  # fmt: skip
+    ]
     curves = [
         Curve("simulated", found.stretch - 1.0, found.stress * 1e-3),
         Curve("measured", np.array(list(MEASURED)), measured * 1e-3, is_theory=True),
     ]
     plot = Plot("Ecoflex 00-30 in tension", "strain", "force / section at rest [kPa]", curves)
     return Findings(checks, [plot])
-
-
-TENSION_SCENE = ValidationScene(
-    name="tension",
-    title="A published curve: silicone in tension",
-    about=(
-        "A bar of the material silicone is pulled to six times its length, and its force is "
-        "compared with that of a published curve at ten points. Two numbers of the material, "
-        "Young's modulus and C20 / C10, were fitted to this curve, to 800 %; that ten points lie "
-        "on it says that the law has the shape of the curve, and that the engine follows the law. "
-        "Below 50 % the curve is up to an eighth lower: its strain is that of the grips, and its "
-        "force begins below zero. The maker's data sheet has twice the stress at 100 %. The bar "
-        "has the preset's own 46.4 kPa."
-    ),
-    measure=_measure_tension,
-    references=[
-        Reference(
-            "Marechal et al., Soft Robotics Materials Database, 'Tensile-Tests-Data/Ecoflex "
-            "00-30.csv', github.com/LucMarechal/Soft-Robotics-Materials-Database",
-            "Ecoflex 00-30, a dumbbell of 33 x 6 x 3 mm after ASTM D412, pulled at 450 mm/min "
-            "until it breaks; strain and stress every 0.1 s",
-        ),
-    ],
-)

@@ -11,11 +11,10 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import THEORY, Check, Findings, ValidationScene
+from scalpel_sim.validate.findings import Findings, lines_of
 from tissue import BladeShape, TetrahedralMesh, block
 
-_LARGEST = 0.05
-"""Largest lateral force over cutting force."""
+_LINES = lines_of("symmetry")
 _STIFFNESS = 30e3
 """Young's modulus [Pa]. Below 10 kPa, where the edge drags the tissue along by more than 2 mm, the
 cut faces buckle to one side, as those of a symmetric body may."""
@@ -42,7 +41,7 @@ def _lateral_share(law: str, cells: tuple[int, int, int], blade: BladeShape | No
     return float(lateral / record.steady_resistance)
 
 
-def _measure(quick: bool) -> Findings:
+def measure_symmetry(quick: bool) -> Findings:
     """Cut mirrored blocks under both laws, with a bare edge and with a scalpel."""
     laws: tuple[str, ...] = ("neo_hookean", "springs")
     checks = []
@@ -52,20 +51,5 @@ def _measure(quick: bool) -> Findings:
                 tool = "bare edge" if blade is None else "scalpel"
                 name = f"{law}, {' × '.join(map(str, cells))} cells, {tool}"
                 share = _lateral_share(law, cells, blade)
-                name += ": |lateral force| / cutting force"
-                checks.append(Check(name, share, 0.0, _LARGEST, basis=THEORY))
+                checks.append(_LINES["lateral"].check(name, share))
     return Findings(checks)
-
-
-SYMMETRY_SCENE = ValidationScene(
-    name="symmetry",
-    title="Symmetry",
-    about=(
-        "A block whose halves are mirror images is cut through its middle. A lateral force on the "
-        "blade there comes from the method and not from the body: the mean of its magnitude is "
-        "compared with the cutting force. Young's modulus is 30 kPa and not an organ's: below 10 "
-        "kPa the edge drags the tissue along by more than 2 mm, and the cut faces buckle to one "
-        "side, as those of a symmetric body may."
-    ),
-    measure=_measure,
-)
