@@ -12,7 +12,6 @@ from benchmarks.kernels import kernels
 from benchmarks.links import device_link, lag, round_trip
 from benchmarks.peers.benchmark import peers
 from benchmarks.real_time import real_time
-from benchmarks.roofline import roofline
 from benchmarks.scaling import cut, scaling
 from benchmarks.strokes import random_strokes
 from benchmarks.studies.mesh_study import mesh_study
@@ -32,11 +31,10 @@ SHORT_LARGEST = 20_250
 
 
 def short(*, runs: Rounds = 5, watch: TurnWatch = SILENT) -> list[BenchmarkResult]:
-    """Run a short set: the kernels in small bodies, one scene, and the limits of the machine."""
+    """Run a short set: the kernels in small bodies, and one scene."""
     return [
         kernels(runs=runs, watch=watch, largest=SHORT_LARGEST),
         measure_scenes(runs, ["slab"], watch),
-        roofline(runs=runs, watch=watch, largest=SHORT_LARGEST),
     ]
 
 
@@ -45,7 +43,6 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "kernels": kernels,
     "scaling": scaling,
     "cut": cut,
-    "roofline": roofline,
     "real-time": real_time,
     "random-strokes": random_strokes,
     "frame": frame,

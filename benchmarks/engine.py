@@ -19,7 +19,6 @@ from tissue.blade.edge import NOWHERE
 from tissue.contact.response.forces import add_contact_forces, end_contact_substep
 from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
-from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 from tissue.forces.step_context import Increment
 from tissue.forces.terms import accelerations
 from tissue.integrators.global_stepper import GlobalStepper
@@ -66,9 +65,6 @@ _TOUGHNESS = 5.0
 
 LAW_NAMES: dict[str, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
 """The laws that are measured, and their names in the tables."""
-
-VECTOR_LENGTH: int = WIDTH
-"""Numbers in one of the engine's vectors."""
 
 
 def jittered_block(n_tetrahedra: int) -> TetrahedralMesh:
@@ -189,17 +185,12 @@ class EngineLoops:
             self._tissue.step(None, FRAME_DT)
 
     @property
-    def springs_per_node(self) -> list[int]:
-        """Number of springs at each node."""
-        counts = self._tissue._model.elasticity.arrays.springs.count[: self._tissue.n_nodes]
-        return [int(count) for count in counts]
-
-    @property
     def springs(self) -> tuple[IntArray, FloatArray]:
         """Nodes of each spring, shape (n_springs, 2), and stiffness [N/m], shape (n_springs,)."""
         rows = self._tissue._model.elasticity.arrays.springs
-        node = np.repeat(np.arange(self._tissue.n_nodes), self.springs_per_node)
-        within = np.concatenate([np.arange(n) for n in self.springs_per_node])
+        counts = rows.count[: self._tissue.n_nodes]
+        node = np.repeat(np.arange(len(counts)), counts)
+        within = np.concatenate([np.arange(n) for n in counts])
         slots = rows.first[node] + within
         is_first = node < rows.neighbour[slots]  # each spring stands in the rows of both nodes
         ends = np.stack([node, rows.neighbour[slots]], axis=1)[is_first]
@@ -280,32 +271,3 @@ def _kick_and_drift(body: Body, accelerations: FloatArray, dt: float) -> None:
         for c in range(3):
             body.velocities[i, c] += dt * accelerations[i, c]
             body.positions[i, c] += dt * body.velocities[i, c]
-
-
-@kernel
-def triad_pass(a: FloatArray, b: FloatArray, c: FloatArray, n: int) -> None:
-    """Compute a = b + s c over whole arrays, `n` times, with another `s` each time."""
-    for k in range(n):
-        s = 1.0 / (k + 1.0)
-        for i in range(len(a)):
-            a[i] = b[i] + s * c[i]
-
-
-@kernel
-def multiply_and_add(values: FloatArray, n: int) -> None:
-    """Multiply eight vectors and add to them, `n` times; `values` has eight vectors."""
-    a, b = load_lanes(values, 0), load_lanes(values, WIDTH)
-    c, d = load_lanes(values, 2 * WIDTH), load_lanes(values, 3 * WIDTH)
-    e, f = load_lanes(values, 4 * WIDTH), load_lanes(values, 5 * WIDTH)
-    g, h = load_lanes(values, 6 * WIDTH), load_lanes(values, 7 * WIDTH)
-    factor, term = lanes(0.5), lanes(1.0)
-    for _ in range(n):
-        a = a * factor + term
-        b = b * factor + term
-        c = c * factor + term
-        d = d * factor + term
-        e = e * factor + term
-        f = f * factor + term
-        g = g * factor + term
-        h = h * factor + term
-    store_lanes(values, 0, a + b + c + d + e + f + g + h)

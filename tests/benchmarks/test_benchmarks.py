@@ -8,7 +8,6 @@ import pytest
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
 from benchmarks.frame import TIMED_PARTS, Stopwatches, Trace, trace_frame
 from benchmarks.kernels import kernels
-from benchmarks.roofline import roofline
 from benchmarks.scaling import (
     RELAXATION_NAME,
     SMALLEST_CUT,
@@ -75,19 +74,6 @@ def test_a_local_frame_splits_a_dozen_in_a_body_of_any_size(capsys):
     assert all(6.0 < n < 24.0 for n in splits)
     assert (f"{RELAXATION_NAME}: blade moves, nothing split", 6_000) in by_case
     assert "split in a cut frame" in printed(found, capsys)
-
-
-def test_a_roofline_reports_the_limits_the_needs_of_a_step_and_its_share(capsys):
-    found = roofline(runs=1, largest=576)
-    assert all(map(is_sane, found.measurements))
-    by_case = {each.case: each for each in found.measurements}
-    shares = [share for case, share in by_case.items() if case.startswith("share")]
-    assert len(shares) == 3 and all(0.0 < share.median <= 100.0 for share in shares)
-    (whole,) = [share for share in shares if share.case.startswith("share of the limit")]
-    assert whole.median == max(share.median for share in shares)
-    text = printed(found, capsys)
-    assert "GB/s" in text and "GFLOP/s" in text
-    assert "bytes and" in text and "operations for each of" in text
 
 
 def test_a_call_into_a_file_that_was_left_is_a_return():

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # `--help` should not wait for it
 
 MOST_ROUNDS = 1000
 """More rounds are taken for a typing error."""
-IN_CLONE = ("cut", "kernels", "peers", "real-time", "roofline", "scaling")
+IN_CLONE = ("cut", "kernels", "peers", "real-time", "scaling")
 """Benchmarks of earlier versions that only a clone of the repository has."""
 
 bench = App(
