@@ -16,7 +16,6 @@ from benchmarks.scaling import cut, scaling
 from benchmarks.strokes import random_strokes
 from benchmarks.studies.mesh_study import mesh_study
 from benchmarks.studies.thin_walls import thin_walls
-from benchmarks.studies.two_hands import two_hands
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, exit_code, one_line
 from scalpel_sim.runs.console import say_error
@@ -58,7 +57,6 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "peers": peers,
     "mesh-study": mesh_study,
     "thin-walls": thin_walls,
-    "two-hands": two_hands,
 }
 """The benchmarks by name. Arguments `runs` and `watch` come from the options that all have."""
 

@@ -14,6 +14,7 @@ from scalpel_sim.strokes.asked import asked_area
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.moved_scenes import moved
+from tests.support.battery import battery
 from tissue import pieces_of
 
 ACCOUNT = ("solver.audit=true",)
@@ -29,9 +30,9 @@ def done(scene):
     return simulation
 
 
-def done_from_elsewhere(scene):
+def done_from_elsewhere(scene, case=1):
     """The scene, with hands that start up to three millimetres from where it has them."""
-    return done(moved(scene, np.random.default_rng(1)))
+    return done(moved(scene, np.random.default_rng(case)))
 
 
 def pieces(simulation):
@@ -69,6 +70,13 @@ def check_taut(simulation, asked):
     assert cut[-1] == pytest.approx(asked, rel=0.1)
     is_cutting = (cut > 0.0) & (cut < cut[-1])
     assert (recording.vector("left_force")[is_cutting, 0] < 0.0).all()
+
+
+def check_account(simulation):
+    """The account of the energy closes."""
+    energies = simulation.result.energies
+    lifted = np.abs(simulation.recording.column("work_of_loads_j")).max()
+    assert abs(energies.residual) < 5e-3 * (energies.work_of_blade + lifted)
 
 
 @pytest.fixture(scope="module")
@@ -149,10 +157,19 @@ def test_the_left_hand_feels_nothing_before_it_is_there(retract):
 
 @pytest.mark.parametrize("name", ["retract", "excise", "pinched", "taut"])
 def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(name, request):
-    simulation = request.getfixturevalue(name)
-    energies = simulation.result.energies
-    lifted = np.abs(simulation.recording.column("work_of_loads_j")).max()
-    assert abs(energies.residual) < 5e-3 * (energies.work_of_blade + lifted)
+    check_account(request.getfixturevalue(name))
+
+
+@battery(n_per_change=0, n_long=20)
+@EACH
+def test_a_scene_ends_as_it_should_wherever_its_hands_start(scene, case):
+    simulation = done_from_elsewhere(scene, case)
+    if scene is TAUT:
+        body = InProcessLink(make_tissue(TAUT)).snapshot()
+        check_taut(simulation, asked_area(simulation.stroke, body))
+    else:
+        {"retract": check_retract, "excise": check_excise}[scene.name](simulation)
+    check_account(simulation)
 
 
 # Where the arms stand
