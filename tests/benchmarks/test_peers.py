@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from rich.console import Console
@@ -68,8 +69,8 @@ def test_a_missing_engine_and_one_without_the_case_raise_different_errors(body, 
 def test_ratios_are_taken_in_each_round_and_missing_cases_are_reported(capsys, monkeypatch):
     ours, theirs = OURS_SPRINGS, "MuJoCo flex, Euler"
     monkeypatch.setattr(peer_benchmark, "OURS", {ours: OURS[ours]})
-    chosen = {theirs: PEERS[theirs], "MuJoCo flex, made up": PEERS[theirs]._replace(
-        case="none:damped")}  # fmt: skip
+    made_up = msgspec.structs.replace(PEERS[theirs], case="none:damped")
+    chosen = {theirs: PEERS[theirs], "MuJoCo flex, made up": made_up}
     monkeypatch.setattr(peer_benchmark, "PEERS", chosen)
     found = peers(runs=2, sizes=(576,))
     by_case = {(each.case, each.quantity): each for each in found.measurements}
