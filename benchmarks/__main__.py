@@ -8,14 +8,12 @@ from cyclopts import App, CycloptsError, Parameter
 
 from benchmarks.costs import checked_steps, long_run, saved_state, surface_values, undo
 from benchmarks.frame import fixed_cost, frame
-from benchmarks.kernels import kernels
 from benchmarks.links import device_link, lag, round_trip
+from benchmarks.mesh_study import mesh_study
 from benchmarks.peers.benchmark import peers
 from benchmarks.real_time import real_time
-from benchmarks.scaling import cut, scaling
+from benchmarks.scaling import cut, kernels, scaling
 from benchmarks.strokes import random_strokes
-from benchmarks.studies.mesh_study import mesh_study
-from benchmarks.studies.thin_walls import thin_walls
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, exit_code, one_line
 from scalpel_sim.runs.console import say_error
@@ -56,7 +54,6 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "lag": lag,
     "peers": peers,
     "mesh-study": mesh_study,
-    "thin-walls": thin_walls,
 }
 """The benchmarks by name. Arguments `runs` and `watch` come from the options that all have."""
 

@@ -24,19 +24,8 @@ from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import changed
-from scalpel_sim.validate.speed.measurements import (
-    COUNTED,
-    CPU,
-    NEITHER,
-    WALL,
-    BenchmarkResult,
-    Clock,
-    Measurement,
-    Quantity,
-    summarise_times,
-    summarise_values,
-)
-from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.measurements import CPU, LOWER, WALL, BenchmarkResult
+from scalpel_sim.validate.speed.tables import Rows
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import (
     FloatArray,
@@ -80,15 +69,16 @@ def checked_steps(scene: str = "organ", /, *, no_audit: Flag = False) -> Benchma
         detach()
     share = 100.0 * sum(map(sum, list(taken.values())[1:])) / sum(taken["stages"])
     size = tissue.n_tetrahedra
-    measured = [
-        _times("checked-steps", case, size, np.array(seconds), CPU)
-        for case, seconds in taken.items()
-        if seconds
-    ]
-    shares = Quantity("checked-steps", "checks over stages", size, "share", "%", CPU.name)
-    measured.append(summarise_values(shares, [share]))
-    about = f"Steps of {scene}; {tissue.n_repeated_steps} were repeated."
-    return as_rows("checked steps", measured, about=about)
+    rows = Rows("checked-steps", CPU)
+    for case, seconds in taken.items():
+        if seconds:
+            rows.times(case, size, [np.array(seconds)])
+    rows.values(
+        "checks over stages", size, [share], "%", quantity="share", better=LOWER, clock=CPU.name
+    )
+    return rows.table(
+        "checked steps", f"Steps of {scene}; {tissue.n_repeated_steps} were repeated."
+    )
 
 
 def saved_state(scene: str = "organ", /, *, times: int = 50) -> BenchmarkResult:
@@ -100,7 +90,7 @@ def saved_state(scene: str = "organ", /, *, times: int = 50) -> BenchmarkResult:
     """
     simulation = prepare(scene_called(scene))
     tissue = _tissue_of(simulation)
-    measured: list[Measurement] = []
+    rows = Rows("saved-state")
     for when, share in (("at rest", 0.0), ("in mid-cut", 0.5), ("after", 1.0)):
         simulation.run(share * simulation.duration + simulation.dt)
         state, whole = tissue.save_state(), simulation.save_state()
@@ -114,19 +104,18 @@ def saved_state(scene: str = "organ", /, *, times: int = 50) -> BenchmarkResult:
             "load, with arm": partial(simulation.load_state, whole),
             "save to bytes, with arm": lambda: simulation.save_state().to_bytes(),
         }
-        measured += [
-            _times("saved-state", f"{when}: {case}", tissue.n_tetrahedra, time_calls(do, times))
-            for case, do in cases.items()
-        ]
-        quantity = Quantity(
-            "saved-state", f"{when}: size", tissue.n_tetrahedra, "size", "MB", COUNTED
-        )
-        measured.append(summarise_values(quantity, [1e-6 * len(state.to_bytes())]))
+        for case, do in cases.items():
+            rows.times(f"{when}: {case}", tissue.n_tetrahedra, [time_calls(do, times)])
+        n_bytes = len(state.to_bytes())
+        rows.values(
+            f"{when}: size", tissue.n_tetrahedra, [1e-6 * n_bytes], "MB", quantity="size",
+            better=LOWER,
+        )  # fmt: skip
     about = (
         "A state in new memory is one of those that are kept for undo; else a state takes the "
         "memory of an earlier one. A checkpoint takes `save to bytes, with arm` of the frame loop."
     )
-    return as_rows(f"state of {scene}", measured, about=about)
+    return rows.table(f"state of {scene}", about)
 
 
 def _keep(states: list[TissueState], tissue: Tissue) -> None:
@@ -147,11 +136,10 @@ def surface_values(scene: str = "organ", /, *, times: int = 100) -> BenchmarkRes
     cases: dict[str, Callable[[], object]] = {"surface": tissue.surface}
     for quantity in get_args(SurfaceQuantity):
         cases[quantity] = partial(tissue.surface_values, quantity)
-    measured = [
-        _times("surface-values", case, tissue.n_tetrahedra, time_calls(do, times))
-        for case, do in cases.items()
-    ]
-    return as_rows(f"surface of {scene}", measured, about="In mid-cut.")
+    rows = Rows("surface-values")
+    for case, do in cases.items():
+        rows.times(case, tissue.n_tetrahedra, [time_calls(do, times)])
+    return rows.table(f"surface of {scene}", "In mid-cut.")
 
 
 def undo(scene: str = "organ", /, *, times: int = 10) -> BenchmarkResult:
@@ -184,11 +172,10 @@ def undo(scene: str = "organ", /, *, times: int = 10) -> BenchmarkResult:
             simulation.link.surface()
             drawn[i] = WALL.now() - start
         outputs.close()
-    measured = [
-        _times("undo", case, size, seconds)
-        for case, seconds in (("state and files", undone), ("with the surface", drawn))
-    ]
-    return as_rows("undo", measured, about=f"Cuts of {1e6 * median(areas):.0f} mm2 in {scene}.")
+    rows = Rows("undo")
+    for case, seconds in (("state and files", undone), ("with the surface", drawn)):
+        rows.times(case, size, [seconds])
+    return rows.table("undo", f"Cuts of {1e6 * median(areas):.0f} mm2 in {scene}.")
 
 
 def long_run(
@@ -201,19 +188,18 @@ def long_run(
         scene: Scene, which rests after its stroke.
         seconds: Simulated time [s].
     """
-    measured: list[Measurement] = []
+    rows = Rows("long-run")
     watch.begin(2)
     for every in (CHECKPOINT_SECONDS, 0.0):
         memory, taken, size = _long_run(scene, seconds, every)
         with_checkpoints = f"a checkpoint every {every:g} s" if every else "no checkpoints"
-        measured.append(_times("long-run", f"{with_checkpoints}: frame", size, taken))
+        rows.times(f"{with_checkpoints}: frame", size, [taken])
         for part, n_bytes in enumerate(memory, start=1):
             case = f"{with_checkpoints}: memory after {part} / {_N_MEMORY}"
-            quantity = Quantity("long-run", case, size, "memory", "MB", COUNTED, NEITHER)
-            measured.append(summarise_values(quantity, [1e-6 * n_bytes]))
+            rows.values(case, size, [1e-6 * n_bytes], "MB", quantity="memory")
         watch.tick(with_checkpoints)
     about = "Frames with all that is done between them. Memory: resident, of the process, on Linux."
-    return as_rows(f"{scene}, {seconds:g} s", measured, about=about)
+    return rows.table(f"{scene}, {seconds:g} s", about)
 
 
 def _long_run(name: str, seconds: float, every: float) -> tuple[list[float], FloatArray, int]:
@@ -245,11 +231,3 @@ def _tissue_of(simulation: Simulation) -> Tissue:
     """Return the tissue of a simulation, which is in this process."""
     assert isinstance(simulation.link, InProcessLink)
     return simulation.link.tissue
-
-
-def _times(
-    benchmark: str, case: str, size: int, seconds: FloatArray, clock: Clock = WALL
-) -> Measurement:
-    """Return the measurement of a case that was timed some times, in ms."""
-    quantity = Quantity(benchmark, case, size, "time", "ms", clock.name)
-    return summarise_times(quantity, [seconds], lambda s: 1e3 * s)

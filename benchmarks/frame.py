@@ -20,15 +20,8 @@ from scalpel_sim.runs.options import Flag
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.simulation import Simulation, no_garbage_collection
-from scalpel_sim.validate.speed.measurements import (
-    COUNTED,
-    WALL,
-    BenchmarkResult,
-    Quantity,
-    summarise_times,
-    summarise_values,
-)
-from scalpel_sim.validate.speed.tables import as_rows, compact_table, print_notes
+from scalpel_sim.validate.speed.measurements import LOWER, BenchmarkResult
+from scalpel_sim.validate.speed.tables import Rows, compact_table, print_notes
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import BladeShape
 
@@ -111,13 +104,11 @@ def frame(
     """
     names = [scene_called(name).name for name in scenes or ("slab", "organ")]
     traces = [trace_frame(name) for name in names]
-    measured = [
-        summarise_values(
-            Quantity("frame", f"{each.scene}: {what}", each.tetrahedra, what, "", COUNTED), [n]
-        )
-        for each in traces
-        for what, n in (("files", len(each.calls)), ("returns", each.n_returns))
-    ]
+    rows = Rows("frame")
+    for each in traces:
+        for what, n in (("files", len(each.calls)), ("returns", each.n_returns)):
+            case = f"{each.scene}: {what}"
+            rows.values(case, each.tetrahedra, [n], "", quantity=what, better=LOWER)
 
     def show(console: "Console") -> None:
         table = compact_table("a frame that cuts", ("scene",), ("files", "returns", "calls"))
@@ -132,7 +123,7 @@ def frame(
             console.print(files)
         print_notes(_ABOUT_FRAME, (), console)
 
-    return BenchmarkResult(measured, [], show)
+    return BenchmarkResult(rows.measured, [], show)
 
 
 def trace_frame(name: str, nth: int = _NTH) -> Trace:
@@ -231,22 +222,20 @@ def fixed_cost(
     scene = changed(SCENES["grid2"], material=organ, blade=BladeShape(), audit=audit, speed=0.02)
     watches = Stopwatches()
     watch.begin(2)
-    rows = {"": _steady_frames(prepare(scene), frames, watches)}
+    timed = {"": _steady_frames(prepare(scene), frames, watches)}
     watch.tick("without stopwatches")
     detach = watches.attach()
     try:
-        rows[", with stopwatches"] = _steady_frames(prepare(scene), frames, watches)
+        timed[", with stopwatches"] = _steady_frames(prepare(scene), frames, watches)
     finally:
         detach()
     watch.tick("with stopwatches")
-    measured = []
-    for title, found in rows.items():
+    rows = Rows("fixed-cost")
+    for title, found in timed.items():
         for name in found[-1]:
             case = f"{name}{title}" if name == "whole frame" else name
-            seconds = np.array([1e-9 * row.get(name, 0) for row in found])
-            quantity = Quantity("fixed-cost", case, 48, "time", "µs", WALL.name)
-            measured.append(summarise_times(quantity, [seconds], lambda s: 1e6 * s))
-    return as_rows("fixed cost of a frame", measured, about=_ABOUT_FIXED)
+            rows.times(case, 48, [np.array([1e-9 * row.get(name, 0) for row in found])], "µs")
+    return rows.table("fixed cost of a frame", _ABOUT_FIXED)
 
 
 def _steady_frames(simulation: Simulation, n: int, watches: Stopwatches) -> list[dict[str, int]]:

@@ -16,17 +16,8 @@ import numpy as np
 
 from benchmarks.timing import TurnWatch, time_calls
 from bridge import DeviceClient, DeviceState, InProcessLink, LinkError, TcpLink, TissueLink, serve
-from scalpel_sim.validate.speed.measurements import (
-    COUNTED,
-    NEITHER,
-    WALL,
-    BenchmarkResult,
-    Measurement,
-    Quantity,
-    summarise_times,
-    summarise_values,
-)
-from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.measurements import COUNTED, WALL, BenchmarkResult
+from scalpel_sim.validate.speed.tables import Rows
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import BladeSegment, BladeSweep, FloatArray, Tissue, block
 
@@ -91,14 +82,12 @@ def round_trip(*, watch: TurnWatch = SILENT, steps: int = 4000) -> BenchmarkResu
             stack.callback(link.close)
         poses = {"above": _upright(0.5 * _SIDE, _SIDE), "inside": _upright(0.3 * _SIDE, -_SIDE)}
         watch.begin(len(links) * (2 + len(poses)))
-        measured: list[Measurement] = []
+        rows = Rows("round-trip")
 
         def measure(what: str, ask: Callable[[TissueLink], object]) -> None:
             for name, link in links.items():
                 time_calls(partial(ask, link), _N_WARM_UP)
-                taken = time_calls(partial(ask, link), steps)
-                quantity = Quantity("round-trip", f"{what}, {name}", 6, "time", "µs", WALL.name)
-                measured.append(summarise_times(quantity, [taken], lambda s: 1e6 * s))
+                rows.times(f"{what}, {name}", 6, [time_calls(partial(ask, link), steps)], "µs")
                 watch.tick(f"{what}, {name}")
 
         measure("link alone", methodcaller("n_pieces"))
@@ -108,7 +97,7 @@ def round_trip(*, watch: TurnWatch = SILENT, steps: int = 4000) -> BenchmarkResu
                 _draw_in(link, pose)
             sweep = BladeSweep(pose, pose)
             measure(f"blade {where}", methodcaller("step", sweep, _DT))
-    return as_rows("round trip", measured, about=_ABOUT_TCP)
+    return rows.table("round trip", _ABOUT_TCP)
 
 
 def serve_cell() -> None:
@@ -166,15 +155,15 @@ def device_link(scene: str = "organ", /, *, seconds: float = 60.0) -> BenchmarkR
             rests = {name: _time_to_rest(client, act) for name, act in _MISBEHAVIOUR.items()}
             client.end()
         run.communicate()
-        rows = np.genfromtxt(Path(folder) / "stroke.csv", delimiter=",", names=True)
+        stroke = np.genfromtxt(Path(folder) / "stroke.csv", delimiter=",", names=True)
         forces = np.genfromtxt(Path(folder) / "forces.csv", delimiter=",", names=True)
-    speed, turn_rate = _fastest(rows)
+    speed, turn_rate = _fastest(stroke)
     force = np.sqrt(sum(forces[f"force_{axis}_n"] ** 2 for axis in "xyz")).max()
     passed = (speed > (1.0 + _ROUNDING) * limits.most_speed) + (
         turn_rate > (1.0 + _ROUNDING) * limits.most_turn_rate
     )
-    reply = Quantity("device-link", "request to reply", None, "time", "ms", WALL.name)
-    measured = [summarise_times(reply, [taken], lambda s: 1e3 * s)]
+    rows = Rows("device-link")
+    rows.times("request to reply", None, [taken])
     for case, unit, value in (
         *((f"until rest after {name}", "ms", 1e3 * rest) for name, rest in rests.items()),
         (f"fastest, limit {limits.most_speed:g}", "m/s", speed),
@@ -187,10 +176,9 @@ def device_link(scene: str = "organ", /, *, seconds: float = 60.0) -> BenchmarkR
         ("cut", "mm2", 1e6 * forces["cut_area_m2"][-1]),
     ):
         clock = WALL.name if unit == "ms" else COUNTED
-        quantity = Quantity("device-link", case, None, case, unit, clock, NEITHER)
-        measured.append(summarise_values(quantity, [float(value)]))
+        rows.values(case, None, [float(value)], unit, clock=clock)
     about = f"{len(taken):,} poses in {seconds:g} s, {state.time:.1f} s simulated."
-    return as_rows(scene, measured, about=about)._replace(is_right=not passed)
+    return rows.table(scene, about)._replace(is_right=not passed)
 
 
 def _lead(client: DeviceClient, seconds: float) -> tuple[FloatArray, DeviceState]:
@@ -249,14 +237,13 @@ def lag(*scenes: str) -> BenchmarkResult:
     """
     from tests.scalpel_sim.hands.driven_view import DrivenView
 
-    measured, paces = [], []
+    rows, paces = Rows("lag"), []
     for scene in scenes or ("grid2", "organ"):
         with tempfile.TemporaryDirectory() as folder, DrivenView(scene, Path(folder)) as view:
             lags, pace = _lags_in(view.url)
-        quantity = Quantity("lag", scene, None, "lag", "ms", WALL.name)
-        measured.append(summarise_times(quantity, [lags], lambda s: 1e3 * s))
+        rows.times(scene, None, [lags], quantity="lag")
         paces.append(f"{scene}: {pace}")
-    return as_rows("lag of the picture", measured, about="; ".join(paces))
+    return rows.table("lag of the picture", "; ".join(paces))
 
 
 def _lags_in(url: str) -> tuple[FloatArray, str]:

@@ -23,17 +23,16 @@ from scalpel_sim.simulation import Simulation, no_garbage_collection
 from scalpel_sim.validate.speed.measurements import (
     COUNTED,
     HIGHER,
+    LOWER,
     NEITHER,
     WALL,
     BenchmarkResult,
-    Measurement,
     Quantity,
     Skipped,
     summarise_times,
-    summarise_values,
 )
 from scalpel_sim.validate.speed.scenes import checked_scene_names
-from scalpel_sim.validate.speed.tables import compact_table, print_notes, three_digits
+from scalpel_sim.validate.speed.tables import Rows, compact_table, print_notes, three_digits
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
 
@@ -130,23 +129,24 @@ def real_time(
     cases = [TimedRun(*pair, mode) for pair in pairs for mode in RUN_MODES] * (1 if quick else runs)
     seconds = QUICK_SECONDS if quick else None
     found: dict[TimedRun, list[Frames]] = {}
-    skipped: list[Skipped] = []
+    rows = Rows("real-time")
     watch.begin(len(cases) + len(pairs) * len(counts))
     for case in cases:
         try:
             found.setdefault(case, []).append(_stroke_frames(case, seconds))
         except (TissueError, ValueError) as error:
-            skipped.append(Skipped("real-time", case.name, None, str(error)))
+            rows.skip(case.name, None, str(error))
         watch.tick(case.name)
     for pair in pairs:
         try:
             for case, frames in _random_stroke_frames(*pair, counts, seconds, watch):
                 found.setdefault(case, []).append(frames)
         except TissueError as error:
-            skipped.append(Skipped("real-time", f"{', '.join(pair)}: strokes", None, str(error)))
+            rows.skip(f"{', '.join(pair)}: strokes", None, str(error))
     found = {case: turns for case, turns in found.items() if turns}
-    measured = [each for case, turns in found.items() for each in _measurements(case, turns)]
-    return BenchmarkResult(measured, skipped, partial(_print, found, skipped))
+    for case, turns in found.items():
+        _add(rows, case, turns)
+    return BenchmarkResult(rows.measured, rows.skipped, partial(_print, found, rows.skipped))
 
 
 def _scene(name: str, material: str) -> Scene:
@@ -235,27 +235,19 @@ def _timed(tissue: Tissue, sweeps: Sequence[BladeSweep | None]) -> Frames:
     )
 
 
-def _measurements(case: TimedRun, turns: Sequence[Frames]) -> list[Measurement]:
-    """Return the measurements of one case."""
-
-    def quantity(name: str, unit: str, clock: str = WALL.name, better: str = "lower") -> Quantity:
-        return Quantity("real-time", case.name, turns[0].tetrahedra, name, unit, clock, better)
-
-    seconds = [turn.seconds for turn in turns]
-    measured = [
-        summarise_times(quantity("frame", "ms"), seconds, lambda s: _MS_PER_S * s),
-        summarise_times(
-            quantity("substeps", "steps", COUNTED), [turn.substeps for turn in turns], float
-        ),
-    ]
-    for name, unit, clock, better, values in (
-        ("p99.9 of a frame", "ms", WALL.name, "lower", [_p999(turn) for turn in turns]),
+def _add(rows: Rows, case: TimedRun, turns: Sequence[Frames]) -> None:
+    """Add the measurements of one case."""
+    name, size = case.name, turns[0].tetrahedra
+    rows.times(name, size, [turn.seconds for turn in turns], quantity="frame")
+    substeps = Quantity("real-time", name, size, "substeps", "steps", COUNTED)
+    rows.measured.append(summarise_times(substeps, [turn.substeps for turn in turns], float))
+    for quantity, unit, clock, better, values in (
+        ("p99.9 of a frame", "ms", WALL.name, LOWER, [_p999(turn) for turn in turns]),
         ("real-time factor", "s/s", WALL.name, HIGHER, [_factor(turn) for turn in turns]),
         ("late frames", "%", WALL.name, NEITHER, [_late(turn) for turn in turns]),
         ("added mass", "%", COUNTED, NEITHER, [100.0 * turn.added_mass for turn in turns]),
     ):
-        measured.append(summarise_values(quantity(name, unit, clock, better), values))
-    return measured
+        rows.values(name, size, values, unit, quantity=quantity, better=better, clock=clock)
 
 
 def _p999(turn: Frames) -> float:

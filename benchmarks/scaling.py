@@ -5,12 +5,11 @@ each cache. A cut does not: the same slit is cut into blocks of three sizes. `cu
 so that the blade meets the same tetrahedra in each block, and times the paper's CD and GC alone:
 collision detection, subdivision, separation, and the springs and masses that change. A local frame
 is a whole one, in which the paper's hierarchy relaxes what is near the blade and freezes the rest.
+`kernels` times the loops of a step one by one, and those of contact.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
-from operator import mul
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from benchmarks.engine import (
     LAW_NAMES,
     BlockCells,
     EngineLoops,
+    TouchingBlocks,
     block_material,
     held_nodes,
     jittered_block,
@@ -30,16 +30,8 @@ from benchmarks.engine import (
 from benchmarks.timing import Case, Largest, Rounds, TurnWatch, time_in_turns
 from scalpel_sim.simulation import no_garbage_collection
 from scalpel_sim.validate.speed.machine import memory_bytes
-from scalpel_sim.validate.speed.measurements import (
-    CPU,
-    WALL,
-    BenchmarkResult,
-    Measurement,
-    Quantity,
-    Skipped,
-    summarise_times,
-)
-from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.measurements import CPU, BenchmarkResult
+from scalpel_sim.validate.speed.tables import Rows
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from tissue import (
     BladeSegment,
@@ -56,6 +48,10 @@ _SIZES = (576, 6_000, 60_000, 199_800, 600_000, 1_000_188)
 """Sizes of the blocks in which steps are timed [tetrahedra]."""
 _LOCAL_SIZES = (6_000, 60_000, 1_000_188)
 """Sizes of the blocks in which local frames are timed [tetrahedra]."""
+_KERNEL_SIZES = (576, 5_400, 20_250, 60_000)
+"""Sizes of the blocks in which loops are timed [tetrahedra]."""
+_TOUCHING_SIZE = 5_400
+"""Size of each of the two blocks that touch [tetrahedra]."""
 SMALLEST_CUT = 1_080
 _CUT_BLOCKS: dict[int, BlockCells] = {
     SMALLEST_CUT: (5, 6, 6),
@@ -82,11 +78,16 @@ BYTES_PER_TETRAHEDRON = 2_000
 """Memory that a body takes while it is made; measured, and rounded up."""
 SHARE_OF_MEMORY = 0.6
 """Share of the free memory that all bodies together may take: other programs need some too."""
-_NS_PER_S, _US_PER_S, _MS_PER_S = 1e9, 1e6, 1e3
 
 _ABOUT = (
     "Blocks of jittered cells of 10 mm, held on four sides; one thread; sizes take turns. CPU: CPU "
     "time. A step of the whole body costs the same per tetrahedron until the body outgrows a cache."
+)
+_ABOUT_KERNELS = (
+    "ns/tet: ns per tetrahedron. Blocks of jittered cells of 10 mm, held on four sides; one "
+    "thread. CPU: CPU time. Forces: one evaluation, dampers included. A Runge-Kutta step evaluates "
+    "forces three times and dampers four times. The time step includes everything that is done in "
+    "1 ms without a blade."
 )
 _ABOUT_LOCAL = (
     "Whole frames of 1 ms: detection, cut, relaxation, the force on the blade, and the work of "
@@ -151,27 +152,64 @@ def scaling(
     return [measure_steps(runs, sizes, watch), measure_local_frames(runs, local_sizes, watch)]
 
 
+def kernels(
+    *, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None
+) -> BenchmarkResult:
+    """Time forces, steps, a cut step and contact detection in 576 to 60,000 tetrahedra."""
+    sizes = sizes_up_to(_KERNEL_SIZES, largest)
+    cases: list[Case] = []
+    for size in sizes:
+        for law, law_name in LAW_NAMES.items():
+            loops = EngineLoops(jittered_block(size), law)
+            cases += [
+                Case(f"{law_name}: forces", loops.forces, size),
+                Case(f"{law_name}: Runge-Kutta step", loops.runge_kutta_steps, size),
+                Case(f"{law_name}: time step of 1 ms", loops.frames, size),
+            ]
+    n_of_laws = len(cases)
+    touching_size = min(_TOUCHING_SIZE, sizes[-1])
+    touching = TouchingBlocks(touching_size)
+    cases += [
+        Case("contact: new search", touching.new_searches, 2 * touching_size),
+        Case("contact: search", touching.searches, 2 * touching_size),
+        Case("contact: forces of a step", touching.forces, 2 * touching_size),
+    ]
+    rows = Rows("kernels", CPU)
+    taken = time_in_turns(cases, runs, clock=CPU, watch=watch)
+    for i, (case, rounds) in enumerate(zip(cases, taken, strict=True)):
+        unit, per = ("ns/tet", case.size) if i < n_of_laws else ("µs", None)
+        rows.times(case.name, case.size, rounds, unit, per=per or 1.0)
+    rows.measured += cut(runs=runs, watch=watch, largest=SMALLEST_CUT).measurements
+    return rows.table("kernels", _ABOUT_KERNELS)
+
+
 def cut(*, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None) -> BenchmarkResult:
     """Time a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
     sizes = sizes_up_to(tuple(_CUT_BLOCKS), largest)
     cut_block(sizes[0])  # loads the kernels and wakes the processor
-    watch.begin(runs * len(sizes))
-    rounds: dict[int, list[SlitFrames]] = {size: [] for size in sizes}
-    for _ in range(runs):
-        for size in sizes:
-            rounds[size].append(cut_block(size))
-            watch.tick(f"cut in {size:,} tetrahedra")
-    measured = []
-    for size, slits in rounds.items():
+    rows = Rows("cut")
+    for size, slits in _in_turns(sizes, runs, cut_block, watch).items():
         note = f"{slits[0].splits.sum():.0f} split in {len(slits[0].splits)} steps"
         for case, samples in (
             ("cut step", [each.cut for each in slits]),
             ("split tetrahedron", [each.cut / each.splits for each in slits]),
             ("blade moves, nothing split", [each.other for each in slits]),
         ):
-            quantity = Quantity("cut", case, size, "time", "µs", WALL.name, note=note)
-            measured.append(summarise_times(quantity, samples, lambda s: _US_PER_S * s))
-    return as_rows("cost of a cut step", measured, about=_ABOUT_CUT)
+            rows.times(case, size, samples, "µs", note=note)
+    return rows.table("cost of a cut step", _ABOUT_CUT)
+
+
+def _in_turns(
+    sizes: Sequence[int], n_rounds: int, cut: Callable[[int], SlitFrames], watch: Watch
+) -> dict[int, list[SlitFrames]]:
+    """Cut a slit into a new block of each size in each round; return the cuts by size."""
+    watch.begin(n_rounds * len(sizes))
+    rounds: dict[int, list[SlitFrames]] = {size: [] for size in sizes}
+    for _ in range(n_rounds):
+        for size in sizes:
+            rounds[size].append(cut(size))
+            watch.tick(f"cut in {size:,} tetrahedra")
+    return rounds
 
 
 def cut_block(n_tetrahedra: int) -> SlitFrames:
@@ -187,25 +225,17 @@ def measure_local_frames(
     n_rounds: int, sizes: Sequence[int], watch: Watch = SILENT
 ) -> BenchmarkResult:
     """Cut a slit into each body in turns, and time whole frames."""
-    fitting, skipped = sizes_that_fit(sizes, memory_bytes(), "local frame")
+    rows = Rows("local frame", CPU)
+    fitting = sizes_that_fit(sizes, memory_bytes(), rows)
     _local_frames(fitting[0])  # loads the kernels
-    watch.begin(n_rounds * len(fitting))
-    rounds: dict[int, list[SlitFrames]] = {size: [] for size in fitting}
-    for _ in range(n_rounds):
-        for size in fitting:
-            rounds[size].append(_local_frames(size))
-            watch.tick(f"{RELAXATION_NAME}, {size:,}")
-    measured = []
-    for size, slits in rounds.items():
+    for size, slits in _in_turns(fitting, n_rounds, _local_frames, watch).items():
         splits = np.mean([each.splits.mean() for each in slits])
         for case, samples, note in (
             ("cut frame", [each.cut for each in slits], f"{splits:.1f} split in a cut frame"),
             ("blade moves, nothing split", [each.other for each in slits], ""),
         ):
-            name = f"{RELAXATION_NAME}: {case}"
-            quantity = Quantity("local frame", name, size, "time", "µs", CPU.name, note=note)
-            measured.append(summarise_times(quantity, samples, lambda s: _US_PER_S * s))
-    return as_rows("local frame", measured, skipped, about=_ABOUT_LOCAL)
+            rows.times(f"{RELAXATION_NAME}: {case}", size, samples, "µs", note=note)
+    return rows.table("local frame", _ABOUT_LOCAL)
 
 
 def _local_frames(n_tetrahedra: int) -> SlitFrames:
@@ -242,39 +272,32 @@ def _cut_slit(slit: Slit, tissue: Tissue, cells: BlockCells, *, is_whole: bool) 
 
 def measure_steps(n_rounds: int, sizes: Sequence[int], watch: Watch = SILENT) -> BenchmarkResult:
     """Time a Runge-Kutta step at each size, under each law."""
-    fitting, skipped = sizes_that_fit(sizes, memory_bytes(), "scaling", len(LAW_NAMES))
-    cases: list[tuple[str, int, Case]] = []
-    for size in fitting:
-        for law, law_name in LAW_NAMES.items():
-            name = f"{law_name}: Runge-Kutta step"
-            loops = EngineLoops(jittered_block(size), law)
-            cases.append((name, size, Case(f"{name}, {size:,}", loops.runge_kutta_steps)))
-    taken = time_in_turns([case for _, _, case in cases], n_rounds, clock=CPU, watch=watch)
-    measured: list[Measurement] = []
-    for (name, size, _), rounds in zip(cases, taken, strict=True):
-        for what, unit, factor in (
-            ("time per tetrahedron", "ns/tet", _NS_PER_S / size),
-            ("time", "ms", _MS_PER_S),
-        ):
-            quantity = Quantity("scaling", name, size, what, unit, CPU.name)
-            measured.append(summarise_times(quantity, rounds, partial(mul, factor)))
-    measured.sort(key=lambda each: (each.case, each.unit, each.tetrahedra))
-    return as_rows("scaling", measured, skipped, about=_ABOUT)
+    rows = Rows("scaling", CPU)
+    cases = [
+        Case(f"{name}: Runge-Kutta step", EngineLoops(jittered_block(n), law).runge_kutta_steps, n)
+        for n in sizes_that_fit(sizes, memory_bytes(), rows, len(LAW_NAMES))
+        for law, name in LAW_NAMES.items()
+    ]
+    taken = time_in_turns(cases, n_rounds, clock=CPU, watch=watch)
+    for (name, _, n), rounds in zip(cases, taken, strict=True):
+        rows.times(name, n, rounds, "ns/tet", per=n or 1.0, quantity="time per tetrahedron")
+        rows.times(name, n, rounds)
+    rows.measured.sort(key=lambda each: (each.case, each.unit, each.tetrahedra))
+    return rows.table("scaling", _ABOUT)
 
 
 def sizes_that_fit(
-    sizes: Sequence[int], available: int | None, benchmark: str, n_of_each: int = 1
-) -> tuple[tuple[int, ...], list[Skipped]]:
-    """Return the sizes whose bodies fit together into the free memory, and why others do not.
+    sizes: Sequence[int], available: int | None, rows: Rows, n_of_each: int = 1
+) -> tuple[int, ...]:
+    """Return the sizes whose bodies fit together into the free memory.
 
     Args:
         sizes: Numbers of tetrahedra, from small to large.
         available: Free memory [bytes]; None where it is unknown: then all sizes fit.
-        benchmark: Name of the benchmark that makes the bodies.
+        rows: Rows of the benchmark that makes the bodies; they get why other sizes do not fit.
         n_of_each: Bodies of each size.
     """
     fit: list[int] = []
-    skipped: list[Skipped] = []
     for size in sizes:
         needed = BYTES_PER_TETRAHEDRON * n_of_each * (sum(fit) + size)
         if available is None or needed <= SHARE_OF_MEMORY * available:
@@ -284,5 +307,5 @@ def sizes_that_fit(
                 f"together with the smaller bodies it needs {needed / 1e9:.1f} GB, and "
                 f"{SHARE_OF_MEMORY:.0%} of the {available / 1e9:.1f} GB of free memory may be used"
             )
-            skipped.append(Skipped(benchmark, benchmark, size, reason))
-    return tuple(fit), skipped
+            rows.skip(rows.benchmark, size, reason)
+    return tuple(fit)

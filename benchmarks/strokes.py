@@ -17,13 +17,8 @@ from scalpel_sim import SCENES
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.runs.options import Flag
 from scalpel_sim.scene.scene import Scene, changed
-from scalpel_sim.validate.speed.measurements import (
-    CPU,
-    BenchmarkResult,
-    Quantity,
-    summarise_times,
-)
-from scalpel_sim.validate.speed.tables import compact_table, print_notes
+from scalpel_sim.validate.speed.measurements import CPU, BenchmarkResult
+from scalpel_sim.validate.speed.tables import Rows, compact_table, print_notes
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import (
     BladeSegment,
@@ -219,11 +214,10 @@ def _result(
             console.print(note, highlight=False)
         print_notes(_ABOUT, (), console)
 
-    if not done:
-        return BenchmarkResult([], [], show, is_right)
-    frame = Quantity("random-strokes", "mean frame", done[0].tetrahedra, "time", "ms", CPU.name)
-    measured = summarise_times(frame, [np.array([s.seconds for s in done])], lambda s: 1e3 * s)
-    return BenchmarkResult([measured], [], show, is_right)
+    rows = Rows("random-strokes", CPU)
+    if done:
+        rows.times("mean frame", done[0].tetrahedra, [np.array([each.seconds for each in done])])
+    return BenchmarkResult(rows.measured, [], show, is_right)
 
 
 def overlap_report(tissue: Tissue) -> list[str]:

@@ -34,6 +34,8 @@ class Case(NamedTuple):
     name: str
     run: Callable[[int], None]
     """Executes the case the given number of times."""
+    size: int | None = None
+    """Size of its body [tetrahedra]."""
 
 
 def time_in_turns(
@@ -68,7 +70,8 @@ def time_in_turns(
         for _ in range(n_rounds):
             for i in order:
                 taken[i].append(time_turn(cases[i].run, n_calls[i], clock, turn))
-                watch.tick(cases[i].name)
+                size = "" if cases[i].size is None else f", {cases[i].size:,}"
+                watch.tick(cases[i].name + size)
             order.reverse()
     return taken
 

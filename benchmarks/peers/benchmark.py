@@ -6,6 +6,7 @@ same number of force evaluations.
 
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from functools import partial
@@ -28,16 +29,8 @@ from benchmarks.peers.process import (
 )
 from benchmarks.timing import Largest, Rounds, TurnWatch
 from scalpel_sim.errors import UsageError
-from scalpel_sim.validate.speed.measurements import (
-    HIGHER,
-    BenchmarkResult,
-    Measurement,
-    Quantity,
-    Skipped,
-    summarise_times,
-    summarise_values,
-)
-from scalpel_sim.validate.speed.tables import compact_table, print_notes, three_digits
+from scalpel_sim.validate.speed.measurements import HIGHER, BenchmarkResult, Clock
+from scalpel_sim.validate.speed.tables import Rows, compact_table, print_notes, three_digits
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 
 if TYPE_CHECKING:
@@ -48,8 +41,7 @@ _SIZES = (5_400, 20_250, 60_000)
 _TURN = 0.25
 """CPU time that a case steps for in each round [s]."""
 _NOT_FINITE = "its positions are no longer finite: what it computed is not a motion"
-_MS_PER_S = 1e3
-_CLOCK = "CPU of the process"
+_CLOCK = Clock("CPU of the process", time.process_time)
 
 
 class EngineCase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -125,24 +117,18 @@ def peers(
     wanted = sizes_up_to(tuple(sizes), largest)
     pythons = _pythons(python)
     done: list[PeerRun] = []
-    skipped: list[Skipped] = []
+    rows = Rows("peers", _CLOCK)
     watch.begin(len(wanted) * runs * len(OURS | PEERS))
     for size in wanted:
-        done_of_size, skipped_of_size = _run_in_one_body(size, runs, pythons, watch)
-        done += done_of_size
-        skipped += skipped_of_size
-    measured = [measurement for each in done for measurement in _measurements(each, done)]
-    return BenchmarkResult(measured, skipped, partial(_print, done, measured, skipped))
+        done += _run_in_one_body(size, runs, pythons, rows, watch)
+    for each in done:
+        _add(rows, each, done)
+    return BenchmarkResult(rows.measured, rows.skipped, partial(_print, done, rows))
 
 
-def _print(
-    runs: Sequence[PeerRun],
-    measured: Sequence[Measurement],
-    skipped: Sequence[Skipped],
-    console: "Console",
-) -> None:
+def _print(runs: Sequence[PeerRun], rows: Rows, console: "Console") -> None:
     """Print a table for each size: time of a step, ratios to ours, and what differs."""
-    times = {(m.case, m.tetrahedra, m.quantity): m for m in measured}
+    times = {(m.case, m.tetrahedra, m.quantity): m for m in rows.measured}
     for size in sorted({each.tetrahedra for each in runs}):
         title = f"{size:,} tetrahedra: CPU time in ms for a step of 1 ms"
         right = ("forces", "ms", "p95", "p99", "x springs", "x solid")
@@ -159,7 +145,7 @@ def _print(
             )
         console.print(table)
     versions = ", ".join(sorted({f"{one.case.engine} {one.version}" for one in runs}))
-    print_notes(f"{versions}. {_ABOUT}", skipped, console)
+    print_notes(f"{versions}. {_ABOUT}", rows.skipped, console)
 
 
 def ratio_to(name: str) -> str:
@@ -178,10 +164,9 @@ def _pythons(python: Path | None) -> list[Path]:
 
 
 def _run_in_one_body(
-    size: int, n_rounds: int, pythons: Sequence[Path], watch: Watch
-) -> tuple[list[PeerRun], list[Skipped]]:
-    """Start every case, and run them in turns; return the runs, and what did not run."""
-    skipped: list[Skipped] = []
+    size: int, n_rounds: int, pythons: Sequence[Path], rows: Rows, watch: Watch
+) -> list[PeerRun]:
+    """Start every case, and run them in turns; `rows` get what did not run."""
     running: list[tuple[PeerProcess, PeerRun]] = []
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
@@ -189,7 +174,7 @@ def _run_in_one_body(
         for name, case in (OURS | PEERS).items():
             started = _started(name, case, body, pythons)
             if isinstance(started, str):
-                skipped.append(Skipped("peers", name, size, started))
+                rows.skip(name, size, started)
                 continue
             stack.enter_context(closing(started))
             running.append((started, PeerRun(name, case, started.version, size, [])))
@@ -197,12 +182,12 @@ def _run_in_one_body(
             for process, run in list(running):
                 failure = _take_turn(process, run)
                 if failure:
-                    skipped.append(Skipped("peers", run.name, size, failure))
+                    rows.skip(run.name, size, failure)
                     running.remove((process, run))
                 watch.tick(f"{run.name}, {size:,}")
             running.reverse()
     order = list(OURS | PEERS)
-    return sorted((run for _, run in running), key=lambda run: order.index(run.name)), skipped
+    return sorted((run for _, run in running), key=lambda run: order.index(run.name))
 
 
 def _started(name: str, case: EngineCase, body: Path, pythons: Sequence[Path]) -> PeerProcess | str:
@@ -231,17 +216,13 @@ def _take_turn(process: PeerProcess, run: PeerRun) -> str:
     return ""
 
 
-def _measurements(run: PeerRun, all_runs: Sequence[PeerRun]) -> list[Measurement]:
-    """Return the time of a step, and its ratios to our times in the same rounds."""
+def _add(rows: Rows, run: PeerRun, all_runs: Sequence[PeerRun]) -> None:
+    """Add the time of a step, and its ratios to our times in the same rounds."""
     case = run.case
     note = f"{case.law}; force evaluations: {case.evaluations}; {case.differs}"
-    time = Quantity("peers", run.name, run.tetrahedra, "time", "ms", _CLOCK, note=note)
-    seconds = [turn.seconds for turn in run.turns]
-    measured = [summarise_times(time, seconds, lambda s: _MS_PER_S * s)]
-    if case.engine == "ours":
-        return measured
+    rows.times(run.name, run.tetrahedra, [turn.seconds for turn in run.turns], note=note)
     damping = UNDAMPED if run.name.endswith(UNDAMPED) else ""
-    for name in (OURS_SPRINGS, OURS_SOLID):
+    for name in (OURS_SPRINGS, OURS_SOLID) if case.engine != "ours" else ():
         for ours in all_runs:
             if (ours.name, ours.tetrahedra) != (name + damping, run.tetrahedra):
                 continue
@@ -249,8 +230,7 @@ def _measurements(run: PeerRun, all_runs: Sequence[PeerRun]) -> list[Measurement
                 float(np.median(theirs.seconds) / np.median(of_ours.seconds))
                 for theirs, of_ours in zip(run.turns, ours.turns, strict=True)
             ]
-            ratio = Quantity(
-                "peers", run.name, run.tetrahedra, ratio_to(name), "x", _CLOCK, better=HIGHER
-            )
-            measured.append(summarise_values(ratio, ratios))
-    return measured
+            rows.values(
+                run.name, run.tetrahedra, ratios, "x", quantity=ratio_to(name), better=HIGHER,
+                clock=_CLOCK.name,
+            )  # fmt: skip

@@ -7,12 +7,12 @@ import pytest
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
 from benchmarks.frame import TIMED_PARTS, Stopwatches, Trace, trace_frame
-from benchmarks.kernels import kernels
 from benchmarks.scaling import (
     RELAXATION_NAME,
     SMALLEST_CUT,
     cut,
     cut_block,
+    kernels,
     measure_local_frames,
     measure_steps,
 )

@@ -2,6 +2,7 @@
 
 from benchmarks.scaling import SHARE_OF_MEMORY, sizes_that_fit
 from scalpel_sim.validate.speed.machine import cache_sizes, describe_machine, memory_bytes
+from scalpel_sim.validate.speed.tables import Rows
 
 
 def test_the_machine_is_described():
@@ -13,9 +14,9 @@ def test_the_machine_is_described():
 
 
 def test_bodies_that_do_not_fit_the_memory_are_omitted_with_a_reason():
-    fit, skipped = sizes_that_fit((576, 6_000, 10**9), 2_000_000_000, "made")
-    assert fit == (576, 6_000)
-    (one,) = skipped
+    rows = Rows("made")
+    assert sizes_that_fit((576, 6_000, 10**9), 2_000_000_000, rows) == (576, 6_000)
+    (one,) = rows.skipped
     assert (one.benchmark, one.tetrahedra) == ("made", 10**9)
     assert "2.0 GB" in one.reason and f"{SHARE_OF_MEMORY:.0%}" in one.reason
-    assert sizes_that_fit((576, 10**9), None, "made") == ((576, 10**9), [])
+    assert sizes_that_fit((576, 10**9), None, rows) == (576, 10**9) and len(rows.skipped) == 1

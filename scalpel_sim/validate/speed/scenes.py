@@ -14,16 +14,9 @@ from scalpel_sim.validate.speed.measurements import (
     NEITHER,
     WALL,
     BenchmarkResult,
-    Measurement,
-    Quantity,
-    summarise_times,
-    summarise_values,
 )
-from scalpel_sim.validate.speed.tables import as_rows
+from scalpel_sim.validate.speed.tables import Rows
 from scalpel_sim.validate.speed.watch import SILENT, Watch
-from tissue import FloatArray
-
-_MS_PER_S = 1e3
 
 _ABOUT = (
     "The whole stroke of each scene, without pictures or files. A frame simulates 1 ms: arm, "
@@ -62,8 +55,10 @@ def measure_scenes(
             simulation, sizes[name] = _run_scene(name, seconds)
             runs[name].append(simulation.recording)
             watch.tick(name)
-    measured = [each for name in names for each in _measurements(name, sizes[name], runs[name])]
-    return as_rows("scenes", measured, about=_ABOUT)
+    rows = Rows("scenes")
+    for name in names:
+        _add(rows, name, sizes[name], runs[name])
+    return rows.table("scenes", _ABOUT)
 
 
 def _run_scene(name: str, seconds: float | None) -> tuple[Simulation, int]:
@@ -74,29 +69,24 @@ def _run_scene(name: str, seconds: float | None) -> tuple[Simulation, int]:
     return simulation, n_tetrahedra
 
 
-def _measurements(name: str, size: int, runs: Sequence[Recording]) -> list[Measurement]:
-    """Return the measurements of one scene."""
-
-    def frame_time(case: str, rounds: list[FloatArray]) -> Measurement:
-        quantity = Quantity("scenes", f"{name}: {case}", size, "time", "ms", WALL.name)
-        return summarise_times(quantity, rounds, lambda s: _MS_PER_S * s)
-
+def _add(rows: Rows, name: str, size: int, runs: Sequence[Recording]) -> None:
+    """Add the measurements of one scene."""
     frames = [run.column("frame_s") for run in runs]
-    measured = [frame_time("frame", frames)]
+    rows.times(f"{name}: frame", size, frames)
     inside = [run.column("anchored_length_m") > 0.0 for run in runs]
     if all(each.any() for each in inside):
         with_blade = [f[i] for f, i in zip(frames, inside, strict=True)]
-        measured.append(frame_time("frame, blade in the tissue", with_blade))
+        rows.times(f"{name}: frame, blade in the tissue", size, with_blade)
     for stage, column in STAGES.items():
         if stage != "RD":
-            measured.append(frame_time(stage, [run.column(column) for run in runs]))
+            rows.times(f"{name}: {stage}", size, [run.column(column) for run in runs])
     for case, unit, better, values in (
         ("real-time factor", "s/s", HIGHER, [_real_time_factor(run) for run in runs]),
         ("late frames", "%", NEITHER, [_late_share(run) for run in runs]),
     ):
-        quantity = Quantity("scenes", f"{name}: {case}", size, case, unit, WALL.name, better)
-        measured.append(summarise_values(quantity, values))
-    return measured
+        rows.values(
+            f"{name}: {case}", size, values, unit, quantity=case, better=better, clock=WALL.name
+        )
 
 
 def _real_time_factor(run: Recording) -> float:

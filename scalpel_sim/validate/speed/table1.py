@@ -25,11 +25,8 @@ from scalpel_sim.validate.speed.measurements import (
     NEITHER,
     WALL,
     BenchmarkResult,
-    Measurement,
-    Quantity,
-    summarise_values,
 )
-from scalpel_sim.validate.speed.tables import compact_table
+from scalpel_sim.validate.speed.tables import Rows, compact_table
 from scalpel_sim.validate.speed.watch import SILENT, Watch
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
@@ -80,8 +77,10 @@ def measure_table1(
     watch.begin(n_rounds * len(cases))
     rounds = [[_turn(case, watch) for case in cases] for _ in range(n_rounds)]
     runs = list(zip(*rounds, strict=True))
-    measured = [measurement for each in runs for measurement in _measurements(each)]
-    return BenchmarkResult(measured, [], partial(print_rows, [_median(each) for each in runs]))
+    rows = Rows("table1")
+    for each in runs:
+        _add(rows, each)
+    return BenchmarkResult(rows.measured, [], partial(print_rows, [_median(each) for each in runs]))
 
 
 def _turn(case: tuple[_Cells, str], watch: Watch) -> GridRow:
@@ -91,30 +90,22 @@ def _turn(case: tuple[_Cells, str], watch: Watch) -> GridRow:
     return row
 
 
-def _measurements(runs: Sequence[GridRow]) -> list[Measurement]:
-    """Return the measurements of one grid and scheme."""
+def _add(rows: Rows, runs: Sequence[GridRow]) -> None:
+    """Add the measurements of one grid and scheme."""
     first = runs[0]
-    case = f"{'x'.join(map(str, first.cells))} cells, {first.scheme}"
-
-    def measurement(
-        name: str, unit: str, values: list[float], clock: str, better: str
-    ) -> Measurement:
-        quantity = Quantity(
-            "table1", case, first.tetrahedra_initial, name, unit, clock, better=better
-        )
-        return summarise_values(quantity, values)
-
-    shares = {stage: [row.percent[stage] for row in runs] for stage in first.percent}
-    finals: list[float] = [row.tetrahedra_final for row in runs]
-    return [
-        measurement("frames", "1/s", [row.frame_rate for row in runs], WALL.name, HIGHER),
-        measurement("a picture", "ms", [row.picture_ms for row in runs], WALL.name, LOWER),
-        *(
-            measurement(f"share of {stage}", "%", values, WALL.name, NEITHER)
-            for stage, values in shares.items()
-        ),
-        measurement("after the cut", "tetrahedra", finals, COUNTED, NEITHER),
-    ]
+    case, size = (
+        f"{'x'.join(map(str, first.cells))} cells, {first.scheme}",
+        first.tetrahedra_initial,
+    )
+    shares = {f"share of {s}": [row.percent[s] for row in runs] for s in first.percent}
+    finals = [float(row.tetrahedra_final) for row in runs]
+    for quantity, unit, values, clock, better in (
+        ("frames", "1/s", [row.frame_rate for row in runs], WALL.name, HIGHER),
+        ("a picture", "ms", [row.picture_ms for row in runs], WALL.name, LOWER),
+        *((share, "%", values, WALL.name, NEITHER) for share, values in shares.items()),
+        ("after the cut", "tetrahedra", finals, COUNTED, NEITHER),
+    ):
+        rows.values(case, size, values, unit, quantity=quantity, better=better, clock=clock)
 
 
 def print_rows(rows: Sequence[GridRow], console: "Console") -> None:

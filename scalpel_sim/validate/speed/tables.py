@@ -1,16 +1,24 @@
 """Tables of measurements, and the comparison of two runs, with verdicts where they are sure."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from scalpel_sim.validate.speed.measurements import (
+    COUNTED,
     HIGHER,
     NEITHER,
+    WALL,
     BenchmarkResult,
+    Clock,
     Measurement,
+    Quantity,
     SavedResults,
     Skipped,
+    summarise_times,
+    summarise_values,
 )
+from tissue import FloatArray
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,6 +32,9 @@ DRIFT = 0.1
 """Smaller relative changes get no verdict. Two runs of the same program on a shared machine
 differed by up to this much although the rounds within each run agreed far better: a neighbour may
 occupy caches and memory for a whole run."""
+
+TIME_UNITS = {"ms": 1e3, "µs": 1e6, "ns": 1e9}
+"""Units of times, in a second."""
 
 BUSY = 0.5
 """Mean number of running programs above which the machine counts as shared."""
@@ -49,27 +60,87 @@ def three_digits(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"
 
 
-def as_rows(
-    title: str,
-    measurements: Sequence[Measurement],
-    skipped: Sequence[Skipped] = (),
-    *,
-    about: str,
-) -> BenchmarkResult:
-    """Return the result of a benchmark that is printed as a row for each measurement.
+class Rows:
+    """The measurements of a benchmark, which are printed as a row each.
 
     Args:
-        title: Title of the table.
-        measurements: The rows.
-        skipped: What was not measured.
-        about: Explanation below the table.
+        benchmark: Name of the benchmark.
+        clock: Clock of its times.
     """
-    with_bodies = any(each.tetrahedra is not None for each in measurements)
-    right = ("tetrahedra",) * with_bodies + ("median", "p95", "p99", "n")
 
-    def show(console: "Console") -> None:
+    def __init__(self, benchmark: str, clock: Clock = WALL) -> None:
+        self.benchmark = benchmark
+        self._clock = clock
+        self.measured: list[Measurement] = []
+        self.skipped: list[Skipped] = []
+
+    def times(
+        self,
+        case: str,
+        size: int | None,
+        rounds: Sequence[FloatArray],
+        unit: str = "ms",
+        *,
+        per: float = 1.0,
+        quantity: str = "time",
+        note: str = "",
+    ) -> None:
+        """Add a time.
+
+        Args:
+            case: What was timed.
+            size: Size of the body [tetrahedra].
+            rounds: Samples [s], an array for each round.
+            unit: A unit of `TIME_UNITS`, or one of them per something.
+            per: Number of these things.
+            quantity: Name of the time.
+            note: What to know before comparing it with another.
+        """
+        factor = TIME_UNITS[unit.partition("/")[0]] / per
+        what = Quantity(self.benchmark, case, size, quantity, unit, self._clock.name, note=note)
+        self.measured.append(summarise_times(what, rounds, lambda s: factor * s))
+
+    def values(
+        self,
+        case: str,
+        size: int | None,
+        values: Sequence[float],
+        unit: str,
+        *,
+        quantity: str | None = None,
+        better: str = NEITHER,
+        clock: str = COUNTED,
+    ) -> None:
+        """Add a quantity with one value for each round.
+
+        Args:
+            case: What was measured.
+            size: Size of the body [tetrahedra].
+            values: The values.
+            unit: Their unit.
+            quantity: Name of the quantity; the case by default.
+            better: Which values are better.
+            clock: Name of the clock that the values depend on.
+        """
+        what = Quantity(self.benchmark, case, size, quantity or case, unit, clock, better)
+        self.measured.append(summarise_values(what, values))
+
+    def skip(self, case: str, size: int | None, reason: str) -> None:
+        """Note that something was not measured, and why."""
+        self.skipped.append(Skipped(self.benchmark, case, size, reason))
+
+    def table(self, title: str, about: str) -> BenchmarkResult:
+        """Return the result, with a title of its table and an explanation below."""
+        return BenchmarkResult(
+            self.measured, self.skipped, partial(self._print, title=title, about=about)
+        )
+
+    def _print(self, console: "Console", title: str, about: str) -> None:
+        """Print a row for each measurement."""
+        with_bodies = any(each.tetrahedra is not None for each in self.measured)
+        right = ("tetrahedra",) * with_bodies + ("median", "p95", "p99", "n")
         table = compact_table(title, ("case",), right, ("unit", "clock"))
-        for each in measurements:
+        for each in self.measured:
             size = "" if each.tetrahedra is None else f"{each.tetrahedra:,}"
             table.add_row(
                 each.case,
@@ -80,12 +151,11 @@ def as_rows(
                 each.clock,
             )
         console.print(table)
-        for of_body, note in dict.fromkeys((m.tetrahedra, m.note) for m in measurements if m.note):
+        noted = [(each.tetrahedra, each.note) for each in self.measured if each.note]
+        for of_body, note in dict.fromkeys(noted):
             text = note if of_body is None else f"{of_body:,} tetrahedra: {note}"
             console.print(text, style="dim")
-        print_notes(about, skipped, console)
-
-    return BenchmarkResult(list(measurements), list(skipped), show)
+        print_notes(about, self.skipped, console)
 
 
 def compact_table(
