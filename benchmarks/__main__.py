@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from benchmarks.costs import checked_steps, long_run, saved_state, surface_values, undo
+from benchmarks.costs import checked_steps, saved_state, surface_values, undo
 from benchmarks.frame import fixed_cost, frame
 from benchmarks.links import device_link, lag, round_trip
 from benchmarks.mesh_study import mesh_study
@@ -48,7 +48,6 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "saved-state": saved_state,
     "surface-values": surface_values,
     "undo": undo,
-    "long-run": long_run,
     "round-trip": round_trip,
     "device-link": device_link,
     "lag": lag,

@@ -1,4 +1,4 @@
-"""Costs around the frames of a scene: states, checks, surfaces, undo, long runs."""
+"""Costs around the frames of a scene: states, checks, surfaces, undo."""
 
 import tempfile
 import time
@@ -11,24 +11,20 @@ from typing import get_args
 import numpy as np
 
 from benchmarks.frame import Stopwatches
-from benchmarks.timing import TurnWatch, time_calls
+from benchmarks.timing import time_calls
 from bridge import InProcessLink
 from scalpel_sim import Simulation, prepare
 from scalpel_sim.hands.commands import Engage, Move, Release, Undo
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.runs.options import Flag
-from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.validate.speed.measurements import CPU, LOWER, WALL, BenchmarkResult
 from scalpel_sim.validate.speed.tables import Rows
-from scalpel_sim.validate.speed.watch import SILENT
 from tissue import (
-    FloatArray,
     SurfaceQuantity,
     Tissue,
     TissueState,
@@ -36,8 +32,6 @@ from tissue import (
 
 _DRAWN = 0.035
 """How far a hand draws the blade in each stroke [m]."""
-_N_MEMORY = 10
-"""How often the memory of a long run is read."""
 
 
 def checked_steps(scene: str = "organ", /, *, no_audit: Flag = False) -> BenchmarkResult:
@@ -176,55 +170,6 @@ def undo(scene: str = "organ", /, *, times: int = 10) -> BenchmarkResult:
     for case, seconds in (("state and files", undone), ("with the surface", drawn)):
         rows.times(case, size, [seconds])
     return rows.table("undo", f"Cuts of {1e6 * median(areas):.0f} mm2 in {scene}.")
-
-
-def long_run(
-    *, watch: TurnWatch = SILENT, scene: str = "grid2", seconds: float = 60.0
-) -> BenchmarkResult:
-    """Measure memory and frames of a long run that is written, with checkpoints and without.
-
-    Args:
-        watch: Receives the progress.
-        scene: Scene, which rests after its stroke.
-        seconds: Simulated time [s].
-    """
-    rows = Rows("long-run")
-    watch.begin(2)
-    for every in (CHECKPOINT_SECONDS, 0.0):
-        memory, taken, size = _long_run(scene, seconds, every)
-        with_checkpoints = f"a checkpoint every {every:g} s" if every else "no checkpoints"
-        rows.times(f"{with_checkpoints}: frame", size, [taken])
-        for part, n_bytes in enumerate(memory, start=1):
-            case = f"{with_checkpoints}: memory after {part} / {_N_MEMORY}"
-            rows.values(case, size, [1e-6 * n_bytes], "MB", quantity="memory")
-        watch.tick(with_checkpoints)
-    about = "Frames with all that is done between them. Memory: resident, of the process, on Linux."
-    return rows.table(f"{scene}, {seconds:g} s", about)
-
-
-def _long_run(name: str, seconds: float, every: float) -> tuple[list[float], FloatArray, int]:
-    """Return memory at times [bytes], times between frames [s], and the number of tetrahedra."""
-    scene = changed(scene_called(name), seconds=seconds)
-    simulation = prepare(scene)
-    n_frames = round(seconds / simulation.dt)
-    clock, memory = np.zeros(n_frames), []
-
-    def after_frame(now: Simulation) -> None:
-        n = len(now.recording)
-        clock[n - 1] = time.perf_counter()
-        if n % (n_frames // _N_MEMORY) == 0:
-            lines = Path("/proc/self/status").read_text().splitlines()
-            memory.append(
-                1024.0 * float(next(x for x in lines if x.startswith("VmRSS")).split()[1])
-            )
-
-    with tempfile.TemporaryDirectory() as folder, Plotter() as plotter:
-        columns = simulation.recording.columns
-        outputs = Outputs(Path(folder), plotter, columns, checkpoint_seconds=every)
-        perform(
-            simulation, outputs, scene=scene, settings={}, seconds=seconds, every_frame=after_frame
-        )
-    return memory, np.diff(clock), simulation.result.n_tetrahedra
 
 
 def _tissue_of(simulation: Simulation) -> Tissue:

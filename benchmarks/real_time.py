@@ -1,7 +1,6 @@
-"""Does it run in real time, and does that last? Whole strokes, and frames after random strokes."""
+"""Does it run in real time? Whole strokes in each material, with account and viewer."""
 
 import itertools
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -10,16 +9,13 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import numpy as np
 from cyclopts import Parameter
 
-from benchmarks.strokes import STROKE_DT, STROKE_FLOOR, random_stroke
 from benchmarks.timing import Rounds, TurnWatch
-from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation.prepare import prepare
-from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.runs.run import run_time
 from scalpel_sim.scene.checks import can_audit
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import Scene, changed, material_called
-from scalpel_sim.simulation import Simulation, no_garbage_collection
+from scalpel_sim.simulation import Simulation
 from scalpel_sim.validate.speed.measurements import (
     COUNTED,
     HIGHER,
@@ -33,8 +29,8 @@ from scalpel_sim.validate.speed.measurements import (
 )
 from scalpel_sim.validate.speed.scenes import checked_scene_names
 from scalpel_sim.validate.speed.tables import Rows, compact_table, print_notes, three_digits
-from scalpel_sim.validate.speed.watch import SILENT, Watch
-from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
+from scalpel_sim.validate.speed.watch import SILENT
+from tissue import MATERIALS, FloatArray, TissueError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,21 +40,15 @@ Names = Annotated[Sequence[str], Parameter(consume_multiple=True)]
 AS_SHIPPED = "as shipped"
 """Stands for the material of the scene itself."""
 RUN_MODES = ("plain", "account", "viewer")
-STROKE_COUNTS = (0, 10, 26, 50)
-"""After how many random strokes a frame is timed."""
 QUICK_SECONDS = 0.05
 """How much of a stroke is simulated for a quick look [s]."""
-REST_FRAMES = 200
-"""Frames at rest that are timed after random strokes."""
-_SEED = 0
 _MS_PER_S = 1e3
 
 _ABOUT = (
     "Wall time of a frame of 1 ms; other work on the machine counts. Factor: simulated seconds per "
     "second. Late: frames that took longer than they simulate. Steps: of the relaxation in a frame,"
     " median and most. Account: with an account of the energy. Viewer: with the live page served, "
-    "also where no browser has it open. Stroke: the arm does the scene's whole stroke. After "
-    "random strokes: the tissue alone, at rest and while the next stroke cuts."
+    "also where no browser has it open. The arm does the scene's whole stroke."
 )
 
 
@@ -68,7 +58,7 @@ class TimedRun(NamedTuple):
     scene: str
     material: str
     what: str
-    """One of `RUN_MODES`, or what is done after how many random strokes."""
+    """One of `RUN_MODES`."""
 
     @property
     def name(self) -> str:
@@ -95,10 +85,9 @@ def real_time(
     watch: TurnWatch = SILENT,
     scenes: Names = (),
     materials: Names = (),
-    strokes: Annotated[Sequence[int], Parameter(consume_multiple=True)] = (),
     quick: Annotated[bool, Parameter(negative="")] = False,
 ) -> BenchmarkResult:
-    """Run whole strokes in each material, with account and viewer, and after random strokes.
+    """Run whole strokes in each material, with account and viewer.
 
     Takes many minutes: choose with the options. For example:
 
@@ -111,39 +100,28 @@ def real_time(
         watch: Receives the progress.
         scenes: organ, incision, slab, grid2, grid7 [default: all].
         materials: Names of materials, or "as shipped" [default: that, and all].
-        strokes: After how many random strokes frames are timed [default: 0 10 26 50].
-        quick: Only the begin of each stroke, and the middle of a random one, as shipped, once.
+        quick: Only the begin of each stroke, as shipped, once.
 
     Raises:
-        UsageError: there is no such scene or material, or a number of strokes is negative.
+        UsageError: there is no such scene or material.
     """
     chosen = checked_scene_names(scenes)
     of_material = list(materials) or ([AS_SHIPPED] if quick else [AS_SHIPPED, *MATERIALS])
     for name in of_material:
         if name != AS_SHIPPED:
             material_called(name)
-    if any(count < 0 for count in strokes):
-        raise UsageError(f"--strokes is {', '.join(map(str, strokes))}; a count is 0 or more")
-    counts = sorted(set(strokes or ((0, 1) if quick else STROKE_COUNTS)))
-    pairs = list(itertools.product(chosen, of_material))
-    cases = [TimedRun(*pair, mode) for pair in pairs for mode in RUN_MODES] * (1 if quick else runs)
+    cases = list(itertools.starmap(TimedRun, itertools.product(chosen, of_material, RUN_MODES)))
+    cases *= 1 if quick else runs
     seconds = QUICK_SECONDS if quick else None
     found: dict[TimedRun, list[Frames]] = {}
     rows = Rows("real-time")
-    watch.begin(len(cases) + len(pairs) * len(counts))
+    watch.begin(len(cases))
     for case in cases:
         try:
             found.setdefault(case, []).append(_stroke_frames(case, seconds))
         except (TissueError, ValueError) as error:
             rows.skip(case.name, None, str(error))
         watch.tick(case.name)
-    for pair in pairs:
-        try:
-            for case, frames in _random_stroke_frames(*pair, counts, seconds, watch):
-                found.setdefault(case, []).append(frames)
-        except TissueError as error:
-            rows.skip(f"{', '.join(pair)}: strokes", None, str(error))
-    found = {case: turns for case, turns in found.items() if turns}
     for case, turns in found.items():
         _add(rows, case, turns)
     return BenchmarkResult(rows.measured, rows.skipped, partial(_print, found, rows.skipped))
@@ -181,57 +159,6 @@ def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
         simulation.recording.column("frame_s").copy(),
         np.array(substeps, dtype=np.float64),
         simulation.link.cut_report().now.most_added_mass,
-    )
-
-
-def _random_stroke_frames(
-    name: str, material: str, counts: Sequence[int], seconds: float | None, watch: Watch
-) -> list[tuple[TimedRun, Frames]]:
-    """Time frames after random strokes on one body: at rest, and in the stroke that follows."""
-    scene = changed(_scene(name, material), audit=False, floor=STROKE_FLOOR, table=None)
-    tissue = make_tissue(scene)  # no table: strokes come from all sides
-    random = np.random.default_rng(_SEED)
-    found, done = [], 0
-    for count in counts:
-        for _ in range(done, count):
-            _cut(tissue, random, None)
-        n_rest = REST_FRAMES if seconds is None else round(seconds / STROKE_DT)
-        at_rest = _timed(tissue, [None] * n_rest)
-        found.append((TimedRun(name, material, f"{count} strokes, at rest"), at_rest))
-        in_stroke = _cut(tissue, random, seconds)
-        found.append((TimedRun(name, material, f"{count} strokes, cutting"), in_stroke))
-        done = count + 1
-        watch.tick(f"{name}, {material}: {count} strokes")
-    return found
-
-
-def _cut(tissue: Tissue, random: np.random.Generator, seconds: float | None) -> Frames:
-    """Do a random stroke and time its frames; for a quick look, those in its middle."""
-    edges = random_stroke(tissue, random)
-    frames = _timed(tissue, [BladeSweep(*pair) for pair in itertools.pairwise(edges)])
-    if seconds is None:
-        return frames
-    n = round(seconds / STROKE_DT)
-    middle = slice((len(frames.seconds) - n) // 2, (len(frames.seconds) + n) // 2)
-    return frames._replace(seconds=frames.seconds[middle], substeps=frames.substeps[middle])
-
-
-def _timed(tissue: Tissue, sweeps: Sequence[BladeSweep | None]) -> Frames:
-    """Do frames and time each."""
-    taken, substeps = [], []
-    n_tetrahedra = tissue.n_tetrahedra
-    with no_garbage_collection():
-        for sweep in sweeps:
-            began = time.perf_counter()
-            result = tissue.step(sweep, STROKE_DT)
-            taken.append(time.perf_counter() - began)
-            substeps.append(result.n_substeps)
-    return Frames(
-        n_tetrahedra,
-        STROKE_DT,
-        np.array(taken),
-        np.array(substeps, dtype=np.float64),
-        tissue.cut_report().now.most_added_mass,
     )
 
 

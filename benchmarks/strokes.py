@@ -9,8 +9,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
-from trimesh.triangles import closest_point
 
 from benchmarks.timing import TurnWatch
 from scalpel_sim import SCENES
@@ -23,15 +21,10 @@ from scalpel_sim.validate.speed.watch import SILENT
 from tissue import (
     BladeSegment,
     BladeSweep,
-    BoolArray,
     Energies,
-    FloatArray,
-    IntArray,
     Tissue,
     TissueError,
 )
-from tissue.mesh.body import CUT, OUTER
-from tissue.mesh.faces import OUTWARD
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -48,14 +41,12 @@ _CLOSED = 0.01
 """Largest residual of an account that closes, as a share of the work of the blade."""
 N_AFTER, N_LAST = 50, 1000
 """Frames without a blade after each stroke, and after the last."""
-_MOST_TETRAHEDRA = 1 << 12
-"""Tetrahedra in which points are searched for at once."""
 
 _ABOUT = (
-    "Body and motion after each stroke: the most substeps of a frame, contacts that press, CPU "
-    "time of a simulated millisecond, the fastest node in m/s, and the residual of the account of "
-    "energy as a share of the work of the blade. Stable: every number finite, no node much faster "
-    "than the blade, all at rest within a second of the last stroke."
+    "Body and motion after each stroke: the most substeps of a frame, contacts that press and the "
+    "deepest of them in um, CPU time of a simulated millisecond, the fastest node in m/s, and the "
+    "residual of the account of energy as a share of the work of the blade. Stable: every number "
+    "finite, no node much faster than the blade, all at rest within a second of the last stroke."
 )
 
 
@@ -68,6 +59,8 @@ class DoneStroke(NamedTuple):
     """Most substeps of a frame."""
     contacts: int
     """Number of contacts that press."""
+    penetration: float
+    """Depth of the deepest contact [m]."""
     seconds: float
     """CPU time of a frame, mean over the stroke and the frames after it [s]."""
     fastest: float
@@ -83,9 +76,8 @@ def random_strokes(
     relaxation: Literal["global", "verlet", "hierarchical"] | None = None,
     law: Literal["springs", "neo_hookean"] | None = None,
     audit: Flag = False,
-    overlaps: Flag = False,
 ) -> BenchmarkResult:
-    """Cut the organ by random strokes: stability, CPU time, account of energy, overlaps.
+    """Cut the organ by random strokes: stability, contacts, CPU time, account of energy.
 
     Args:
         watch: Receives the progress.
@@ -94,7 +86,6 @@ def random_strokes(
         relaxation: Method of integration [default: that of the scene].
         law: Law of elasticity [default: that of the scene].
         audit: Keep an account of the energy, which must close within 1 % of the work of the blade.
-        overlaps: Search the cuts for points that lie inside other parts of the body.
     """
     scene = SCENES["organ"]
     material = scene.material
@@ -133,8 +124,6 @@ def random_strokes(
         closes = "the account closes" if residual <= _CLOSED else "the account DOES NOT CLOSE"
         notes.append(f"of {1e3 * energies.work_of_blade:.1f} mJ of work of the blade: {terms}")
         notes.append(f"{closes}: within {1e2 * residual:.3f} %")
-    if overlaps:
-        notes += overlap_report(tissue)
     return _result(scene, done, notes, is_right=is_stable and residual <= _CLOSED)
 
 
@@ -183,6 +172,7 @@ def _stroke(tissue: Tissue, random: np.random.Generator) -> DoneStroke:
         pieces=tissue.n_pieces(),
         substeps=substeps,
         contacts=result.body_contacts.n_contacts,
+        penetration=result.body_contacts.penetration,
         seconds=(CPU.now() - began) / len(sweeps),
         fastest=speed,
         energies=result.energies,
@@ -199,13 +189,23 @@ def _result(
     scene: Scene, done: list[DoneStroke], notes: list[str], *, is_right: bool
 ) -> BenchmarkResult:
     """Return the outcome: a row for each stroke, and the judgement."""
-    right = ("stroke", "tetrahedra", "pieces", "substeps", "contacts", "CPU ms", "fastest")
+    right = (
+        "stroke",
+        "tetrahedra",
+        "pieces",
+        "substeps",
+        "contacts",
+        "deepest",
+        "CPU ms",
+        "fastest",
+    )
 
     def show(console: "Console") -> None:
         title = f"organ, law {scene.material.law.name}, relaxation {scene.solver.relaxation}"
         table = compact_table(title, (), (*right, *("residual %",) * scene.solver.audit))
         for i, each in enumerate(done, start=1):
-            row = [*map(str, (i, *each[:4])), f"{1e3 * each.seconds:.2f}", f"{each.fastest:.2f}"]
+            row = [*map(str, (i, *each[:4])), f"{1e6 * each.penetration:.0f}"]
+            row += [f"{1e3 * each.seconds:.2f}", f"{each.fastest:.2f}"]
             if each.energies is not None:
                 row.append(f"{1e2 * _shares(each.energies)['residual']:.3f}")
             table.add_row(*row)
@@ -218,78 +218,3 @@ def _result(
     if done:
         rows.times("mean frame", done[0].tetrahedra, [np.array([each.seconds for each in done])])
     return BenchmarkResult(rows.measured, [], show, is_right)
-
-
-def overlap_report(tissue: Tissue) -> list[str]:
-    """Return how many points of cuts lie in other parts of the body, a line for each kind of point.
-
-    Nodes, middles of edges and middles of faces of cuts are searched for in all tetrahedra that
-    share no node with them, whatever contacts there are. The depth of one that is inside is its
-    distance from the nearest face of the boundary that shares no node with it either.
-    """
-    body, x, size = tissue._body, tissue.snapshot().positions, tissue.node_size
-    links = body.links[: tissue.n_tetrahedra]
-    tetrahedra = body.tetrahedra[: tissue.n_tetrahedra]
-    boundary = _faces(tetrahedra, (links == CUT) | (links == OUTER))
-    cut = _faces(tetrahedra, links == CUT)
-    edges = np.unique(np.sort(cut[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    lines = []
-    for name, own in (("nodes", np.unique(cut)[:, None]), ("edges", edges), ("faces", cut)):
-        points = x[own].mean(axis=1)
-        inside = _are_inside(points, own, x, tetrahedra)
-        depths = np.array([_depth(points[i], own[i], x, boundary) for i in np.flatnonzero(inside)])
-        deep = [int((depths > share * size).sum()) for share in (0.1, 0.2)]
-        lines.append(
-            f"{name}: {len(points)} tested, {len(depths)} inside, deeper than 10 / 20 % of an "
-            f"element: {deep[0]} / {deep[1]}, deepest {1e6 * depths.max(initial=0.0):.0f} um"
-        )
-    return lines
-
-
-def _faces(tetrahedra: IntArray, wanted: BoolArray) -> IntArray:
-    """Return the nodes of the faces that are wanted of each tetrahedron, shape (n_tets, 4)."""
-    tetrahedron, face = np.nonzero(wanted)
-    nodes: IntArray = tetrahedra[tetrahedron[:, None], OUTWARD[face]]
-    return nodes
-
-
-def _are_inside(points: FloatArray, own: IntArray, x: FloatArray, tets: IntArray) -> BoolArray:
-    """Return which points are inside a tetrahedron that shares no node with them."""
-    inside = np.zeros(len(points), dtype=bool)
-    if len(points) == 0:
-        return inside
-    tree = cKDTree(points)
-    for begin in range(0, len(tets), _MOST_TETRAHEDRA):
-        part = tets[begin : begin + _MOST_TETRAHEDRA]
-        centres = x[part].mean(axis=1)
-        radii = np.linalg.norm(x[part] - centres[:, None], axis=2).max(axis=1)
-        near = tree.query_ball_point(centres, radii)
-        point = np.concatenate([np.array(found, dtype=np.int64) for found in near])
-        nodes = np.repeat(part, [len(found) for found in near], axis=0)
-        is_other = ~(own[point][:, :, None] == nodes[:, None, :]).any(axis=(1, 2))
-        corners, place = x[nodes], points[point]
-        weights = [_volumes(_with(corners, k, place)) for k in range(4)]
-        # In a tetrahedron inside out nothing can be.
-        is_in = (_volumes(corners) > 0.0) & (np.array(weights) > 0.0).all(axis=0)
-        inside[point[is_in & is_other]] = True
-    return inside
-
-
-def _with(corners: FloatArray, k: int, place: FloatArray) -> FloatArray:
-    """Return the corners of tetrahedra with corner `k` elsewhere."""
-    changed = corners.copy()
-    changed[:, k] = place
-    return changed
-
-
-def _volumes(corners: FloatArray) -> FloatArray:
-    """Return six times the signed volume of tetrahedra [m3]."""
-    volumes: FloatArray = np.linalg.det(corners[:, 1:] - corners[:, :1])
-    return volumes
-
-
-def _depth(point: FloatArray, own: IntArray, x: FloatArray, boundary: IntArray) -> float:
-    """Return the distance of a point from the nearest face that has none of its nodes [m]."""
-    others = x[boundary[~np.isin(boundary, own).any(axis=1)]]
-    nearest = closest_point(others, np.broadcast_to(point, (len(others), 3)))
-    return float(np.linalg.norm(nearest - point, axis=1).min())

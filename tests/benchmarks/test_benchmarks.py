@@ -128,7 +128,6 @@ def test_every_benchmark_has_help(name, capsys):
         (["kernels", "--compare", "nothing.json"], "nothing.json: cannot be read"),
         (["peers", "--python", "nowhere"], "--python is nowhere"),
         (["real-time", "--quick", "--materials", "wood"], "liver"),
-        (["real-time", "--quick", "--strokes", "-1"], "0 or more"),
     ],
 )
 def test_wrong_arguments_of_a_benchmark_are_refused(words, expected, capsys):

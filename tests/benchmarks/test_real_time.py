@@ -1,4 +1,4 @@
-"""`real-time` times whole frames in each mode, and after random strokes."""
+"""`real-time` times whole frames in each mode; random strokes are those of their seed."""
 
 import numpy as np
 import pytest
@@ -10,18 +10,10 @@ from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.validate.speed.measurements import load_results
 
-CASES = (
-    "plain",
-    "account",
-    "viewer",
-    "0 strokes, at rest",
-    "0 strokes, cutting",
-    "1 strokes, at rest",
-    "1 strokes, cutting",
-)
+CASES = ("plain", "account", "viewer")
 
 
-def test_a_quick_look_has_a_row_for_each_mode_and_for_random_strokes(capsys, tmp_path):
+def test_a_quick_look_has_a_row_for_each_mode(capsys, tmp_path):
     file = tmp_path / "real_time.json"
     command = ["real-time", "--scenes", "grid2", "--quick", "--save", str(file)]
     assert benchmark_line(command) == EXIT_OK
@@ -35,7 +27,7 @@ def test_a_quick_look_has_a_row_for_each_mode_and_for_random_strokes(capsys, tmp
         assert frame.n == pytest.approx(50, abs=1)
         assert 0.0 < frame.median <= frame.p99 <= 1.001 * found[case, "p99.9 of a frame"].median
         assert factor.median > 0.0
-        assert found[case, "substeps"].median >= (1.0 if case.endswith("cutting") else 0.0)
+        assert found[case, "substeps"].median >= 0.0
         assert 0.0 <= found[case, "late frames"].median <= 100.0
 
 
