@@ -49,18 +49,13 @@ def figure(
     with log_to_stderr(printing):
         check_choice("scheme", scheme, SCHEMES)
         check_file(path, ".png", "--output")
-        from scalpel_sim.figures.figures import draw_figure, draw_organ, draw_two_hands
+        from scalpel_sim.figures.figures import draw_figure
         from scalpel_sim.runs.prepared_run import load_kernels
 
         load_kernels(printing)
         if not printing.quiet:
             say(f"cutting and drawing figure {number}: about half a minute")
-        if number == "organ":
-            drawn = draw_organ(path, scheme)
-        elif number == "retract" or number == "excise" or number == "taut_incision":
-            drawn = draw_two_hands(number, path)
-        else:
-            drawn = draw_figure(number, path, scheme)
+        drawn = draw_figure(number, path, scheme)
         if printing.json:
             print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
         elif not printing.quiet:

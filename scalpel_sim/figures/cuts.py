@@ -74,12 +74,17 @@ def moments(cut: PlannedCut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]
     found = []
     for share in shares:
         simulation.run(duration + REST if share == 1.0 else share * duration)
-        link = simulation.link
-        found.append(Moment(link.snapshot(), link.surface(), tool_of(simulation)))
+        found.append(moment_of(simulation))
     return found
 
 
-def tool_of(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
+def moment_of(simulation: Simulation) -> Moment:
+    """Return the body and the instruments as they are now."""
+    link = simulation.link
+    return Moment(link.snapshot(), link.surface(), _tool_of(simulation))
+
+
+def _tool_of(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
     """Return the meshes of the instruments as they are now, tissue frame, and their shapes."""
     model, poses = simulation.arm.model, body_poses(simulation.arm.data)
     frame = simulation.frame

@@ -4,8 +4,8 @@ They are the figures of the paper, and two moments of the organ and of scenes of
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,8 +21,8 @@ from scalpel_sim.figures.cuts import (
     FIGURE_10_MOMENTS,
     FIGURE_12,
     Moment,
+    moment_of,
     moments,
-    tool_of,
     with_scheme,
 )
 from scalpel_sim.figures.mesh_drawing import draw_mesh
@@ -32,7 +32,6 @@ from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import ViewTable
-from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.textures import map_texture
@@ -91,82 +90,44 @@ class Drawn(NamedTuple):
     """Number of tetrahedra in each panel."""
 
 
-@contextmanager
-def figure_file(path: Path) -> Iterator[Path]:
-    """Yield a name beside `path` to write a figure at, which then replaces the one at `path`.
-
-    Raises:
-        RunError: the file could not be written.
-    """
-    try:
-        with whole_file(path) as unfinished:
-            yield unfinished
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
-        ) from error
-
-
-def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
-    """Do the cuts of Figure 10, 11 or 12, write its PNG, and return what it shows.
+def draw_figure(number: int | str, path: Path, scheme: str = "stellar") -> Drawn:
+    """Do the cuts of a figure, write its PNG, and return what it shows.
 
     Args:
-        number: 10, 11 or 12.
+        number: 10, 11 or 12; organ; or one of `TWO_HANDS`, which are cut as their scenes say.
         path: File to write.
         scheme: How the mesh is cut: `stellar` or `paper`.
 
     Raises:
         RunError: the file could not be written.
     """
-    panels, drawn = {10: _figure_10, 11: _figure_11, 12: _figure_12}[number](scheme)
-    how = "" if scheme == "stellar" else ", cut by the paper's own scheme"
-    _lay_out(panels, drawn.labels, f"Figure {number}: {drawn.caption}{how}", path)
+    of_paper = {10: _figure_10, 11: _figure_11, 12: _figure_12}
+    write: Callable[[Path], object]
+    if isinstance(number, int):
+        panels, drawn = of_paper[number](scheme)
+        how = "" if scheme == "stellar" else ", cut by the paper's own scheme"
+        figure = _lay_out(panels, drawn.labels, f"Figure {number}: {drawn.caption}{how}")
+        canvas = FigureCanvasAgg(figure)
+        write = partial(canvas.print_figure, dpi=_DOTS_PER_INCH, format="png")
+    else:
+        panels, drawn = _organ(scheme) if number == "organ" else _two_hands(number)
+        image = _side_by_side(panels)
+        image = image.quantize(_ORGAN_COLOURS) if number == "organ" else image
+        write = partial(image.save, format="PNG", optimize=True)
+    try:
+        with whole_file(path) as unfinished:
+            write(unfinished)
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
+        ) from error
     return drawn
-
-
-def draw_organ(path: Path, scheme: str = "stellar") -> Drawn:
-    """Cut the organ, write a PNG of two moments side by side, and return what it shows.
-
-    Args:
-        path: The PNG.
-        scheme: How the mesh is cut: `stellar` or `paper`.
-
-    Raises:
-        RunError: the file could not be written.
-    """
-    seen = moments(with_scheme(scheme, ORGAN), _ORGAN_MOMENTS)
-    view = view_of(seen, WITH_TOOL)
-    _write_pair(path, view, seen, colours=_ORGAN_COLOURS)
-    counts = [len(moment.snapshot.tetrahedra) for moment in seen]
-    labels = [f"{share:.0%} of the stroke" for share in _ORGAN_MOMENTS]
-    return Drawn("the arm draws a scalpel through an organ", labels, counts)
-
-
-def draw_two_hands(name: str, path: Path) -> Drawn:
-    """Do a scene of two hands, write a PNG of two moments, and return what it shows.
-
-    Args:
-        name: One of `TWO_HANDS`.
-        path: The PNG.
-
-    Raises:
-        RunError: the file could not be written.
-    """
-    scene = SCENES[name]
-    simulation = prepare(scene)
-    seen = [_at(simulation, seconds) for seconds in TWO_HANDS[name]]
-    view = view_of(seen, WITH_TOOL, scene.views)
-    _write_pair(path, view, seen)
-    labels = [f"after {seconds:g} s" for seconds in TWO_HANDS[name]]
-    return Drawn(scene.about, labels, [len(moment.snapshot.tetrahedra) for moment in seen])
 
 
 def _figure_10(scheme: str) -> tuple[list[FloatArray], Drawn]:
     seen = moments(with_scheme(scheme, FIGURE_10), FIGURE_10_MOMENTS)
-    view = view_of(seen, WITH_TOOL)
-    panels = [picture(view, moment, with_tool=True) for moment in seen]
     caption = "four frames of a cut through a grid of 4 × 6 × 4 cells, pulled apart left and right"
-    return panels, _drawn(caption, seen, ["", "", "", ""])
+    return _pictures(seen), _drawn(caption, seen, ["", "", "", ""])
 
 
 def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
@@ -185,8 +146,37 @@ def _figure_12(scheme: str) -> tuple[list[FloatArray], Drawn]:
     return panels, _drawn("cuts along arbitrary paths through coarse grids", seen, cells)
 
 
+def _organ(scheme: str) -> tuple[list[FloatArray], Drawn]:
+    seen = moments(with_scheme(scheme, ORGAN), _ORGAN_MOMENTS)
+    labels = [f"{share:.0%} of the stroke" for share in _ORGAN_MOMENTS]
+    caption = "the arm draws a scalpel through an organ"
+    return _pictures(seen), Drawn(caption, labels, _sizes(seen))
+
+
+def _two_hands(name: str) -> tuple[list[FloatArray], Drawn]:
+    scene = SCENES[name]
+    simulation = prepare(scene)
+    seen = []
+    for seconds in TWO_HANDS[name]:
+        simulation.run(seconds)
+        seen.append(moment_of(simulation))
+    labels = [f"after {seconds:g} s" for seconds in TWO_HANDS[name]]
+    return _pictures(seen, scene.views), Drawn(scene.about, labels, _sizes(seen))
+
+
+def _pictures(seen: Sequence[Moment], cameras: Sequence[ViewTable] = ()) -> list[FloatArray]:
+    """Return a picture of each moment with the instruments, all in one view."""
+    view = view_of(seen, WITH_TOOL, cameras)
+    return [picture(view, moment, with_tool=True) for moment in seen]
+
+
+def _sizes(seen: Sequence[Moment]) -> list[int]:
+    """Return the number of tetrahedra at each moment."""
+    return [len(moment.snapshot.tetrahedra) for moment in seen]
+
+
 def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Drawn:
-    counts = [len(moment.snapshot.tetrahedra) for moment in seen]
+    counts = _sizes(seen)
     labels = [f"{a}{n:,} tetrahedra" for a, n in zip(prefixes, counts, strict=True)]
     return Drawn(caption, labels, counts)
 
@@ -225,8 +215,8 @@ def picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
     return render(view, objects, lamp=LAMP, background=WHITE)
 
 
-def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path) -> None:
-    """Write the panels, two in a row, each above its letter and label, and the title below all."""
+def _lay_out(panels: list[FloatArray], labels: list[str], title: str) -> Figure:
+    """Return the panels, two in a row, each above its letter and label, and the title below all."""
     n_rows = math.ceil(len(panels) / 2)
     width = 2 * _WIDTH + 3 * GAP
     height = n_rows * (HEIGHT + LINE + GAP) + 2 * LINE + 2 * GAP
@@ -254,23 +244,12 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
         fontsize=8.5,
         style="italic",
     )
-    with figure_file(path) as unfinished:
-        FigureCanvasAgg(figure).print_figure(unfinished, dpi=_DOTS_PER_INCH, format="png")
+    return figure
 
 
-def _at(simulation: Simulation, seconds: float) -> Moment:
-    """Return the moment after so many seconds."""
-    simulation.run(seconds)
-    link = simulation.link
-    return Moment(link.snapshot(), link.surface(), tool_of(simulation))
-
-
-def _write_pair(path: Path, view: View, seen: Sequence[Moment], colours: int | None = None) -> None:
-    """Write a PNG of two moments side by side, of so many colours at most."""
-    left, right = (picture(view, moment, with_tool=True) for moment in seen)
-    gap = np.ones((view.height, GAP, 3))
+def _side_by_side(panels: Sequence[FloatArray]) -> Image.Image:
+    """Return two pictures side by side."""
+    left, right = panels
+    gap = np.ones((len(left), GAP, 3))
     shades = np.clip(np.concatenate([left, gap, right], axis=1), 0.0, 1.0)
-    image = Image.fromarray((255.0 * shades).astype(np.uint8))
-    with figure_file(path) as unfinished:
-        chosen = image if colours is None else image.quantize(colours)
-        chosen.save(unfinished, format="PNG", optimize=True)
+    return Image.fromarray((255.0 * shades).astype(np.uint8))

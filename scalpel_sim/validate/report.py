@@ -211,13 +211,13 @@ def _scene_entry(run: SceneRun) -> dict[str, Any]:
         "title": scene.title,
         "about": scene.about,
         "seconds": round(run.seconds, 1),
-        "lines": [_check_entry(check) for check in run.findings.checks],
+        "lines": [check_entry(check) for check in run.findings.checks],
         "notes": list(run.findings.notes),
         "sources": [msgspec.to_builtins(reference) for reference in scene.references],
     }
 
 
-def _check_entry(check: Check) -> dict[str, Any]:
+def check_entry(check: Check) -> dict[str, Any]:
     """Return a check as JSON has it."""
     return {
         "name": check.name,

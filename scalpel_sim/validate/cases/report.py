@@ -2,10 +2,9 @@
 
 import csv
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
@@ -15,7 +14,7 @@ from scalpel_sim.scene.case import TIME, CaseContent
 from scalpel_sim.validate.cases.expected import ExpectedCurve
 from scalpel_sim.validate.cases.runner import CaseRecord
 from scalpel_sim.validate.findings import FAIL, Check, Curve, Plot
-from scalpel_sim.validate.report import bounds_text, draw_plot, value_text
+from scalpel_sim.validate.report import bounds_text, check_entry, draw_plot, value_text
 from tissue.support import whole_file
 
 TABLE_FILE, SUMMARY_FILE = "case.csv", "case.json"
@@ -79,7 +78,7 @@ def case_as_json(found: CaseFindings, versions: dict[str, str]) -> str:
             if name != TIME
         },
         "expected": [
-            {**_check_entry(check), "source": expected.source}
+            {**check_entry(check), "source": expected.source}
             for check, expected in zip(found.checks, found.case.expected, strict=True)
         ],
         "energies_j": record.energies._asdict() | {"residual": record.energies.residual},
@@ -144,16 +143,4 @@ def _extremes(record: CaseRecord, name: str) -> dict[str, float]:
         "least": float(column.min()),
         "largest": float(column.max()),
         "last": float(column[-1]),
-    }
-
-
-def _check_entry(check: Check) -> dict[str, Any]:
-    """Return a check as JSON has it."""
-    return {
-        "name": check.name,
-        "figure": check.value if math.isfinite(check.value) else None,
-        "unit": check.unit,
-        "low": check.low,
-        "high": check.high,
-        "verdict": check.verdict,
     }
