@@ -17,8 +17,6 @@ if TYPE_CHECKING:  # `--help` should not wait for it
 
 MOST_ROUNDS = 1000
 """More rounds are taken for a typing error."""
-IN_CLONE = ("cut", "kernels", "peers", "real-time", "scaling")
-"""Benchmarks of earlier versions that only a clone of the repository has."""
 
 bench = App(
     name="bench",
@@ -44,14 +42,10 @@ class BenchOptions:
 def _bench_by_name(
     *names: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
 ) -> None:
-    if names and names[0] in IN_CLONE:
-        raise UsageError(
-            f"bench {names[0]} is not part of the program: in a clone of the repository, run "
-            f"python -m benchmarks {names[0]}"
-        )
     asked = f"there is no benchmark {names[0]!r}" if names else "name a benchmark"
     raise UsageError(
-        f"{asked}: scenes or table1; in a clone of the repository python -m benchmarks has others"
+        f"{asked}: scenes or table1; a clone of the repository has others, such as kernels, "
+        "real-time and peers: python -m benchmarks NAME"
     )
 
 

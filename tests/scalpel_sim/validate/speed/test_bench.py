@@ -7,7 +7,6 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.summary import TABLE_1
-from scalpel_sim.validate.speed.command import IN_CLONE
 from scalpel_sim.validate.speed.measurements import HIGHER, LOWER, NEITHER, load_results
 from scalpel_sim.validate.speed.scenes import measure_scenes
 from tests.support.measured import is_sane, printed
@@ -63,6 +62,7 @@ def test_a_run_is_saved_and_compared_with_itself(capsys, tmp_path):
     [
         (["speed"], "no benchmark 'speed'.*scenes or table1"),
         ([], "name a benchmark"),
+        (["kernels", "--largest", "576"], "a clone .* has others, .*kernels.*python -m benchmarks"),
         (["scenes", "--runs", "0"], "--runs is 0"),
         (["table1", "--save", "figures.txt"], "must end in .json"),
         (["scenes", "slap"], "Did you mean 'slab'"),
@@ -75,9 +75,3 @@ def test_wrong_arguments_of_a_benchmark_are_refused_before_it_begins(words, expe
     assert out == ""
     (line,) = (x for x in err.splitlines() if not x.startswith("compiling"))
     assert re.search(expected, line)
-
-
-@pytest.mark.parametrize("name", IN_CLONE)
-def test_a_benchmark_of_earlier_versions_is_answered_with_its_command_in_a_clone(name, capsys):
-    assert command_line(["bench", name, "--largest", "576"]) == 2
-    assert f"python -m benchmarks {name}" in capsys.readouterr().err
