@@ -19,6 +19,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh, splu
 
 from benchmarks.timing import TurnWatch
+from scalpel_sim.validate.beam import limit
 from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import FloatArray, Material, TetrahedralMesh, block, lattice_block
@@ -275,11 +276,6 @@ def study(model: Model, counts: Sequence[int]) -> list[Row]:
     return rows
 
 
-def limit_of_meshes(coarse: float, fine: float, ratio: float) -> float:
-    """Return the limit of a quantity whose error falls with the square of the element size."""
-    return fine + (fine - coarse) / (ratio**2 - 1.0)
-
-
 def page_with(studies: Sequence[Sequence[Row]], page: str) -> str:
     """Return a page of Markdown with the rows of its table replaced."""
     text_rows = []
@@ -290,7 +286,7 @@ def page_with(studies: Sequence[Sequence[Row]], page: str) -> str:
         coarse, fine = rows[-2:]
         pairs = [(coarse.sag, fine.sag)]
         pairs += [(coarse.frequencies[mode], fine.frequencies[mode]) for mode in MODES]
-        limits = [limit_of_meshes(a, b, fine.n / coarse.n) for a, b in pairs]
+        limits = [limit(a, b, fine.n / coarse.n) for a, b in pairs]
         text_rows.append(_text_row(rows[0].model, "limit", "", limits))
     return re.sub(r"(?<=-\|\n)(\| .*\n)+", "\n".join(text_rows) + "\n", page)
 
