@@ -60,7 +60,7 @@ TIMED_PARTS = (
     "scalpel_sim.arm.collision_monitor:CollisionMonitor.check",
     "bridge.bridge:Bridge.step",
     "tissue.tissue:Tissue.step",
-    "tissue.stepping.stages:StepStages._begin_step",
+    "tissue.stepping.stages:StepStages._begin",
     "tissue.stepping.stages:StepStages._relax",
     "tissue.integrators.global_stepper:GlobalStepper.relax",
     "tissue.stepping.stages:StepStages._detect",
