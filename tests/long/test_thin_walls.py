@@ -9,11 +9,11 @@ stroke through it, at a random place, angle and speed.
 import itertools
 
 import numpy as np
+from scalpel_sim.strokes.table import StrokeTable
 
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.strokes.table import StrokeTable
 from tests.support.battery import battery
 from tests.support.bodies import half_shell
 from tissue import BladeSegment, BladeSweep, TetrahedralMesh, Tissue, block, fixed_nodes
