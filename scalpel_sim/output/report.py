@@ -5,7 +5,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from scalpel_sim.output.summary import COMPLETE, TABLE_1, Summary
+from scalpel_sim.output.run_outcome import COMPLETE
+from scalpel_sim.output.summary import TABLE_1, Summary
 from scalpel_sim.recording.recording import TERMS
 from tissue import LAWS
 

@@ -1,5 +1,6 @@
-"""Request and outcome of a run: the figures that warnings are made from."""
+"""Request and outcome of a run: what its summary and its warnings are made from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -9,12 +10,15 @@ import numpy as np
 from bridge import TissueDescription, TissueFrame
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.asked import asked_pieces, first_areas, n_large
+from scalpel_sim.strokes.asked import asked_area, first_areas
+from scalpel_sim.strokes.asked import asked_pieces, n_large
 from scalpel_sim.strokes.expected_force import length_inside
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
+    CutReport,
     FloatArray,
+    Piece,
     Snapshot,
     TetrahedralMesh,
     boundary_faces,
@@ -23,6 +27,9 @@ from tissue import (
 )
 from tissue.support import components
 
+COMPLETE = "complete"
+"""Status of a run that reached its end; any other status says what ended it."""
+
 _SAME_PLACE = 0.5
 """Distance within which a cut goes where one has gone before, in node sizes: it snaps to nodes that
 are nearer than 0.3."""
@@ -30,29 +37,52 @@ are nearer than 0.3."""
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """A run that has ended, whose tissue can still be asked. Lengths in metres, tissue frame."""
+    """A run that has ended, as `outcome_of` returns it. Lengths in metres, tissue frame."""
 
     recording: Recording
     dt: float
     """Simulated time of a frame [s]."""
     stroke: Stroke
-    """Where the blade was to go."""
+    """Planned path of the blade."""
     frame: TissueFrame
-    """Where the tissue lies in the world."""
+    """Pose of the tissue in the world."""
     settings: dict[str, Any]
     """Settings from command line and scene; of a tissue elsewhere some are missing."""
     tissue: TissueDescription
-    """Description of the tissue, wherever it is."""
+    """Description of the tissue before the first frame, wherever it is."""
     first: Snapshot
     """The body before the first frame."""
-    last: Snapshot
-    """The body at the end."""
-    node_size: float
-    """Mean size of a node [m]."""
+    last: Snapshot | None
+    """The body at the end; None where the link to the tissue was lost."""
+    report: CutReport | None
+    """Report on the cut at the end; None where the link to the tissue was lost."""
+    status: str = COMPLETE
+    """`complete`, or what ended the run before its time."""
+    wall_seconds: float = 0.0
+    """Wall time of the frame loop [s]."""
+    tetrahedra_final: int = 0
+    """Number of tetrahedra at the end."""
+    asked_area: float | None = None
+    """Area that the stroke was to cut [m2]; None where that is not known."""
     expected_force: float | None = None
     """Force of the cut if the body does not give way [N]; None where that is not known."""
     counters: dict[str, Any] = field(default_factory=dict)
     """Counters of the bridge."""
+    touched: dict[str, int] = field(default_factory=dict)
+    """Number of frames in which each pair of parts collided."""
+    held_points: Sequence[int] = ()
+    """Number of points that each attachment holds at the end."""
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...] | None:
+        """Pieces at the end, the largest first; None where the link to the tissue was lost."""
+        return None if self.last is None else pieces_of(self.last)
+
+    @property
+    def node_size(self) -> float:
+        """Mean size of a node [m]."""
+        assert self.report is not None
+        return self.report.node_size
 
     @property
     def seconds(self) -> float:
@@ -95,7 +125,7 @@ class RunOutcome:
     @cached_property
     def n_pieces(self) -> int:
         """Number of pieces, crumbs left out."""
-        volumes = np.array([piece.rest_volume for piece in pieces_of(self.last)])
+        volumes = np.array([piece.rest_volume for piece in self.pieces or ()])
         return n_large(volumes, self.node_size)
 
     @property
@@ -127,10 +157,15 @@ class RunOutcome:
         corners = mesh.positions[boundary_faces(mesh.tetrahedra)]
         return length_inside(self.stroke.pose(self.stroke.duration), mesh, corners) > 0.0
 
+    @property
+    def _last(self) -> Snapshot:
+        assert self.last is not None
+        return self.last
+
     @cached_property
     def motion(self) -> tuple[float, float]:
         """How far the body has moved [m] and turned [rad] as a rigid one: its largest piece."""
-        n, last = len(self.first.positions), self.last
+        n, last = len(self.first.positions), self._last
         ends = np.stack([np.repeat(last.tetrahedra[:, 0], 3), last.tetrahedra[:, 1:].ravel()], 1)
         _, label = components(len(last.positions), ends)
         kept = np.flatnonzero(label[:n] == np.bincount(label[:n]).argmax())
@@ -149,7 +184,7 @@ class RunOutcome:
         held = np.flatnonzero(self.first.fixed)
         if not len(held):
             return 0.0
-        moved = (self.last.positions[held] - self.first.positions[held]).mean(axis=0)
+        moved = (self._last.positions[held] - self.first.positions[held]).mean(axis=0)
         return float(np.linalg.norm(moved))
 
     @cached_property
@@ -213,29 +248,39 @@ def outcome_of(
     settings: dict[str, Any],
     tissue: TissueDescription,
     first: Snapshot,
-    last: Snapshot,
-    node_size: float,
+    last: Snapshot | None,
+    report: CutReport | None,
+    status: str = COMPLETE,
 ) -> RunOutcome:
-    """Return what came of a run.
+    """Return the outcome of a run.
 
     Args:
         simulation: After its last frame.
-        settings: What the command line and the scene resolved to.
-        tissue: What is known of the tissue.
+        settings: Settings from command line and scene.
+        tissue: Description of the tissue before the first frame.
         first: The body before the first frame.
-        last: The body at the end.
-        node_size: Mean size of a node [m].
+        last: The body at the end; None where the link to the tissue was lost.
+        report: Report on the cut at the end; None where the link to the tissue was lost.
+        status: `complete`, or what ended the run before its time.
     """
+    bridge, stroke = simulation.bridge, simulation.stroke
     return RunOutcome(
         recording=simulation.recording,
         dt=simulation.dt,
-        stroke=simulation.stroke,
+        stroke=stroke,
         frame=simulation.frame,
         settings=settings,
         tissue=tissue,
         first=first,
         last=last,
-        node_size=node_size,
+        report=report,
+        status=status,
+        wall_seconds=simulation.wall_seconds,
+        tetrahedra_final=(bridge.result or tissue).n_tetrahedra,
+        # What graspers move is elsewhere when the blade comes.
+        asked_area=None if simulation.graspers else asked_area(stroke, first),
         expected_force=simulation.expected_force,
-        counters=simulation.bridge.counters.as_numbers(),
+        counters=bridge.counters.as_numbers(),
+        touched=simulation.touching.frames,
+        held_points=[load.n_points for load in bridge.frame_loads],
     )

@@ -2,18 +2,17 @@
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from scalpel_sim.output.run_outcome import RunOutcome
+from scalpel_sim.output.run_warnings import RunWarning
 from scalpel_sim.recording.columns import ACCOUNT
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.version import version
 from tissue import CutReport, Piece
-
-COMPLETE = "complete"
-"""The status of a run that reached its end; any other status says what ended it."""
 
 STAGES = {"RX": "rx_s", "RD": "rd_s", "GC": "gc_s", "CD": "cd_s"}
 """The stages of the paper's Table 1, in its order, and the columns of the recording with their
@@ -105,39 +104,10 @@ class Summary(NamedTuple):
     versions: dict[str, str]
 
 
-class RunFacts(NamedTuple):
-    """Facts of a run for its summary, besides the recorded frames."""
-
-    scene: str
-    status: str
-    """`complete`, or what ended the run before its time."""
-    dt: float
-    """Simulated time of a frame [s]."""
-    wall_seconds: float
-    """Wall time of the frame loop [s]."""
-    tetrahedra_initial: int
-    tetrahedra_final: int
-    pieces: Sequence[Piece] | None
-    """The pieces at the end; None where the link to the tissue was lost."""
-    quality: CutReport | None
-    """The report on the cut at the end; None where the link to the tissue was lost."""
-    asked_area: float | None
-    """The area that the stroke was to cut [m2]; None where that is not known."""
-    counters: dict[str, Any]
-    """Counters of the bridge."""
-    touched: dict[str, int]
-    """In how many frames each pair of parts collided."""
-    settings: dict[str, Any]
-    """The resolved settings of the run."""
-    held_points: Sequence[int] = ()
-    """Number of points that each attachment holds at the end."""
-    warnings: Sequence[dict[str, Any]] = ()
-    """Warnings of the run: see `scalpel_sim.output.run_warnings`."""
-
-
-def summarise(recording: Recording, facts: RunFacts) -> Summary:
-    """Return the summary of a run."""
-    n = len(recording)
+def summarise(outcome: RunOutcome, warnings: Iterable[RunWarning] = ()) -> Summary:
+    """Return the summary of a run and its warnings."""
+    recording, seconds, wall_seconds = outcome.recording, outcome.seconds, outcome.wall_seconds
+    n, pieces, report = len(recording), outcome.pieces, outcome.report
     force = recording.sizes("force")
     felt = force[force > 0.0]
     frame_times = recording.column("frame_s")
@@ -145,35 +115,35 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
     energies = final_energies(recording)
     work = recording.at_end("work_of_blade_j")
     return Summary(
-        scene=facts.scene,
-        status=facts.status,
-        simulated_seconds=n * facts.dt,
-        wall_seconds=facts.wall_seconds,
-        real_time_factor=n * facts.dt / facts.wall_seconds if n else 0.0,
+        scene=outcome.tissue.scene,
+        status=outcome.status,
+        simulated_seconds=seconds,
+        wall_seconds=wall_seconds,
+        real_time_factor=seconds / wall_seconds if n else 0.0,
         frames=n,
         frame_rate_median=float(1.0 / median),
         frame_rate_p99=float(1.0 / slow),
-        tetrahedra_initial=facts.tetrahedra_initial,
-        tetrahedra_final=facts.tetrahedra_final,
-        pieces=None if facts.pieces is None else len(facts.pieces),
-        each_piece=[_as_numbers(piece) for piece in facts.pieces or ()],
-        quality=None if facts.quality is None else quality_figures(facts.quality),
+        tetrahedra_initial=outcome.tissue.n_tetrahedra,
+        tetrahedra_final=outcome.tetrahedra_final,
+        pieces=None if pieces is None else len(pieces),
+        each_piece=[_as_numbers(piece) for piece in pieces or ()],
+        quality=None if report is None else quality_figures(report),
         cut_area_m2=recording.at_end("cut_area_m2"),
-        asked_area_m2=facts.asked_area,
+        asked_area_m2=outcome.asked_area,
         finished_area_m2=recording.at_end("finished_area_m2"),
-        cut_area_paid_m2=_area_paid_for(energies, facts.settings.get("material", {})),
+        cut_area_paid_m2=_area_paid_for(energies, outcome.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
-        attachments=_attachments(recording, facts),
+        attachments=_attachments(outcome),
         work_of_blade_j=work,
         energies_j=energies,
         residual_of_work=_residual_of_work(recording, energies, work),
         hands=[hand_figures(recording, name) for name in recording.hands],
-        share=shares(recording, facts.wall_seconds),
-        counters=facts.counters,
-        touched=facts.touched,
-        warnings=list(facts.warnings),
-        settings=facts.settings,
+        share=shares(recording, wall_seconds),
+        counters=outcome.counters,
+        touched=outcome.touched,
+        warnings=[warning.as_numbers() for warning in warnings],
+        settings=outcome.settings,
         versions=versions(),
     )
 
@@ -203,16 +173,16 @@ def hand_figures(recording: Recording, name: str) -> dict[str, Any]:
     }
 
 
-def _attachments(recording: Recording, facts: RunFacts) -> list[dict[str, Any]]:
+def _attachments(outcome: RunOutcome) -> list[dict[str, Any]]:
     """Return the figures of the attachments."""
-    tables = facts.settings.get("attachments", [])
+    tables, n_points = outcome.settings.get("attachments", []), outcome.held_points
     found = []
-    for i in range(recording.n_held):
-        sizes = recording.sizes(f"held_{i}")
+    for i in range(outcome.recording.n_held):
+        sizes = outcome.recording.sizes(f"held_{i}")
         found.append(
             {
                 "where": tables[i]["where"] if i < len(tables) else "",
-                "points": facts.held_points[i] if i < len(facts.held_points) else None,
+                "points": n_points[i] if i < len(n_points) else None,
                 "force_peak_n": float(sizes.max(initial=0.0)),
                 "force_at_end_n": float(sizes[-1]) if len(sizes) else 0.0,
             }

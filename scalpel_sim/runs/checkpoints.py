@@ -135,9 +135,14 @@ class Checkpoints:
                 found.append(checkpoint)
         return sorted(found, key=lambda each: -each.head.mark.n_frames)
 
-    def go_on_from(self, n_frames: int) -> None:
-        """Go on after so many frames: the checkpoints of more, which were undone, are removed."""
-        self._remove_after(n_frames)
+    def cut_back(self, n_frames: int) -> None:
+        """Continue after so many frames; the checkpoints of more, which were undone, go."""
+        self.finish()
+        for slot, name in enumerate(CHECKPOINT_FILES):
+            n = self._frames[slot]
+            if n is not None and n > n_frames:
+                self._frames[slot] = None
+                (self._folder / name).unlink(missing_ok=True)
         self._due = n_frames + (self._every if n_frames in self._frames else 0)
 
     @property
@@ -183,19 +188,6 @@ class Checkpoints:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def remove(self) -> None:
-        """Remove all checkpoints."""
-        self._remove_after(-1)
-
-    def _remove_after(self, n_frames: int) -> None:
-        """Remove the checkpoints of more frames."""
-        self.finish()
-        for slot, name in enumerate(CHECKPOINT_FILES):
-            n = self._frames[slot]
-            if n_frames < 0 or (n is not None and n > n_frames):
-                self._frames[slot] = None
-                (self._folder / name).unlink(missing_ok=True)
 
     def _write(self, slot: int, checkpoint: Checkpoint) -> None:
         """Write a checkpoint aside, and put it in its place when it is on the disk."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.output.summary import COMPLETE
+from scalpel_sim.output.run_outcome import COMPLETE
 from scalpel_sim.recording.columns import WALL_TIMES
 from scalpel_sim.recording.growing_file import FileSum, sum_of, sums_that_hold
 from scalpel_sim.recording.recording import Recording, read_forces

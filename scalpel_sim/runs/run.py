@@ -2,8 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from msgspec import structs
 
@@ -11,20 +10,20 @@ from bridge import InProcessLink, LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.teleoperation import Teleoperation
-from scalpel_sim.output.summary import COMPLETE, Summary
+from scalpel_sim.output.run_outcome import COMPLETE
+from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.growing_file import FileSum, sum_of
 from scalpel_sim.runs.checkpoints import Checkpoint, CheckpointHead, Checkpoints
 from scalpel_sim.runs.file_names import FORCES, INITIAL, REPLAY_FRAMES, SCENE, STROKE, grasp_file
 from scalpel_sim.runs.journal import RunPlan
 from scalpel_sim.runs.resumption import RepeatedFrames
-from scalpel_sim.runs.run_end import Attempts, EndedRun, RunStart, write_driven, write_end
+from scalpel_sim.runs.run_end import OpenRun, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.write import relative_path, scene_text
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.asked import asked_area
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
@@ -41,66 +40,36 @@ LONGEST_WAIT = 2.0
 """How long a run that is to end waits for a tissue in another process [s]."""
 
 
-class RunCheckpoints:
-    """Writes the checkpoints of a run. Where the tissue is in another process there are none.
+class RunCheckpoints(Checkpoints):
+    """Checkpoints of a run. Where the tissue is in another process there are none.
 
     Args:
-        outputs: Where they are written, and how often.
-        simulation: The run.
-        replay: Its replay.
+        run: The run, whose files have begun.
     """
 
-    def __init__(self, outputs: Outputs, simulation: Simulation, replay: ReplayWriter) -> None:
-        self._outputs, self._simulation, self._replay = outputs, simulation, replay
-        every = 0
+    def __init__(self, run: OpenRun) -> None:
+        self._run = run
+        outputs, simulation, every = run.outputs, run.simulation, 0
         if outputs.checkpoint_seconds > 0.0 and isinstance(simulation.link, InProcessLink):
             every = max(1, round(outputs.checkpoint_seconds / simulation.dt))
         grown = (FORCES, REPLAY_FRAMES, STROKE, *(grasp_file(g.name) for g in simulation.graspers))
-        self._checkpoints = Checkpoints(outputs.folder, every, grown)
+        super().__init__(outputs.folder, every, grown)
         if outputs.resumption is not None:
-            self._checkpoints.read(is_said=True)
-            self._checkpoints.go_on_from(outputs.resumption.n_frames)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._checkpoints.close()
-
-    @property
-    def are_there(self) -> bool:
-        """Whether there is one from which the run could go on."""
-        return self._checkpoints.are_there
-
-    @property
-    def are_due(self) -> bool:
-        """Whether one is to be written now. All rows must be written before."""
-        return self._checkpoints.is_due(len(self._simulation.recording))
-
-    def write(self) -> None:
-        """Write a checkpoint after a frame."""
-        self._checkpoints.write(self._now)
-
-    def write_last(self) -> None:
-        """Write a checkpoint of the present, if any are wanted, and wait until all are written."""
-        if self._checkpoints.are_wanted:
-            self._checkpoints.write(self._now)
-        self._checkpoints.finish()
+            self.read(is_said=True)
+            self.cut_back(outputs.resumption.n_frames)
 
     def mark(self) -> int:
         """Return how many frames were done."""
-        return len(self._simulation.recording)
+        return len(self._run.simulation.recording)
 
-    def cut_back(self, mark: int) -> None:
-        """Remove the checkpoints of what was undone."""
-        self._checkpoints.go_on_from(mark)
+    def write_now(self) -> None:
+        """Write a checkpoint of the present. All rows must be written before."""
+        self.write(self._now)
 
     def _now(self) -> Checkpoint:
         """Return the run as it is."""
-        simulation = self._simulation
-        n_frames, replay = len(simulation.recording), self._replay.mark()
-        head = CheckpointHead(*self._outputs.checkpoint_notes(n_frames, replay))
-        return Checkpoint(head, simulation.save_state().to_bytes())
+        notes = self._run.outputs.checkpoint_notes(self.mark(), self._run.replay.mark())
+        return Checkpoint(CheckpointHead(*notes), self._run.simulation.save_state().to_bytes())
 
 
 def perform(
@@ -150,63 +119,48 @@ def perform(
             views=views,
             log=log,
         )
-        until = None if hand is not None else seconds
-        start = _begin(simulation, outputs, scene, hand, settings, until)
+        run = OpenRun(simulation, outputs, replay, settings, hand)
+        _begin(run, scene, None if hand is not None else seconds)
         simulation.pictures.append(into_replay(replay))
-        with RunCheckpoints(outputs, simulation, replay) as checkpoints:
+        with RunCheckpoints(run) as checkpoints:
             if controls is not None:
                 controls.history.begin(checkpoints, outputs, replay)
-            failure = _run_frames(
-                simulation, outputs, seconds, every_frame, controls, stop, checkpoints
-            )
+            run.failure = _run_frames(run, seconds, every_frame, controls, stop, checkpoints)
         stopped, stop.is_writing = stop.reason, True
-        status = _status_of(stopped, failure, controls)
-        ended = EndedRun(simulation, outputs, replay, hand, start, settings, status, failure)
-        summary, attempts = write_end(ended)
-        is_done = status in (COMPLETE, ENDED_IN_PAGE) and not attempts.unwritten
+        run.status = stopped or _status_of(run.failure, controls)
+        summary = write_end(run)
+        is_done = run.status in (COMPLETE, ENDED_IN_PAGE) and not run.attempts.unwritten
         if is_done or not checkpoints.are_there:
             outputs.remove_passing_files()
-    can_go_on = checkpoints.are_there and not is_done
-    _raise_what_ended_it(
-        stop, stopped, simulation.time, failure, attempts, outputs.folder, can_go_on=can_go_on
-    )
+    _raise_what_ended_it(run, stop, stopped, can_go_on=checkpoints.are_there and not is_done)
     return summary
 
 
 def _raise_what_ended_it(
-    stop: StopSignals,
-    stopped: str | None,
-    time: float,
-    failure: Exception | None,
-    attempts: Attempts,
-    folder: Path,
-    *,
-    can_go_on: bool,
+    run: OpenRun, stop: StopSignals, stopped: str | None, *, can_go_on: bool
 ) -> None:
     """Raise the first error of a run, or the signal that came, if there was one.
 
     Args:
+        run: The run, whose last files were written.
         stop: The signals until the last file was written.
         stopped: The signal that ended the frames.
-        time: Simulated time [s].
-        failure: The error that ended the frames.
-        attempts: Attempts to write the last files.
-        folder: Where they are.
         can_go_on: Whether `--resume` goes on from there.
 
     Raises:
         Interrupted: the user or the system ended the run, or wanted to when it had ended.
         RunError: the run failed, or a file could not be written.
     """
+    time, folder, attempts = run.simulation.time, run.outputs.folder, run.attempts
     kept = f"{folder} holds what was done"
     if attempts.unwritten:
         kept += f", but not {', '.join(dict.fromkeys(attempts.unwritten))}"
     further = f"; --resume {folder} goes on from there" if can_go_on else ""
-    if failure is not None:
-        is_of_files = isinstance(failure.__cause__, OSError)  # what diverged would do so again
+    if run.failure is not None:
+        is_of_files = isinstance(run.failure.__cause__, OSError)  # what diverged would do so again
         raise RunError(
-            f"after {time:.3f} s: {one_line(failure)}; {kept}{further if is_of_files else ''}"
-        ) from failure
+            f"after {time:.3f} s: {one_line(run.failure)}; {kept}{further if is_of_files else ''}"
+        ) from run.failure
     if stopped is not None:
         raise Interrupted(f"{stopped} after {time:.3f} s; {kept}{further}")
     if attempts.errors:
@@ -215,56 +169,43 @@ def _raise_what_ended_it(
         raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
 
 
-def _begin(
-    simulation: Simulation,
-    outputs: Outputs,
-    scene: Scene | None,
-    hand: Teleoperation | None,
-    settings: dict[str, Any],
-    seconds: float | None,
-) -> RunStart:
+def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> None:
     """Write what is known before the first frame, and keep space for what comes after the last.
 
     A run that goes on is put where it was first: what is refused leaves its folder as it is.
 
     Args:
-        simulation: At its start.
-        outputs: The folder of the files.
+        run: At its start.
         scene: See `perform`.
-        hand: What leads the blade, or None for a script.
-        settings: Settings to keep in the summary.
         seconds: How long the run is to last [s]; None: as long as the hand leads.
 
     Raises:
         StateError: a run that goes on is made otherwise than it was.
         RunError: the system refuses, or there is no room for a run.
     """
-    body, title, at_first = simulation.link.describe(), simulation.title, simulation.link.snapshot()
+    simulation, outputs, hand = run.simulation, run.outputs, run.hand
     if hand is not None:
         hand.take_over(simulation)
     if outputs.resumption is not None:
         outputs.resumption.load_into(simulation)
-        outputs.write_mesh(INITIAL, at_first)  # its size is that of the space that is kept
+        outputs.write_mesh(INITIAL, run.first)  # its size is that of the space that is kept
         outputs.keep_reserve()
         outputs.remove_earlier_files()
-    scene = _scene_to_write(scene, hand, outputs)
+    if scene is not None and hand is not None:
+        scene = _repeated(scene, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
     exports = [str(path.absolute()) for path in outputs.exports]
     read = {} if scene is None or hand is not None else _sums_of_recorded(scene, outputs)
-    outputs.begin_journal(RunPlan(simulation.dt, text, exports, settings), seconds, read)
+    outputs.begin_journal(RunPlan(simulation.dt, text, exports, run.settings), seconds, read)
     if outputs.resumption is None:
-        outputs.write_mesh(INITIAL, at_first)
+        outputs.write_mesh(INITIAL, run.first)
         outputs.keep_reserve()
-    # What graspers move is elsewhere when the blade comes.
-    asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
-    return RunStart(body, title, at_first, asked)
 
 
 def _run_frames(
-    simulation: Simulation,
-    outputs: Outputs,
+    run: OpenRun,
     seconds: float,
     every_frame: Callable[[Simulation], None] | None,
     controls: RunControls | None,
@@ -274,15 +215,14 @@ def _run_frames(
     """Do the frames, and return the error that ended them early.
 
     Args:
-        simulation: At its start, or where it goes on.
-        outputs: The folder of the files.
+        run: At its start, or where it goes on.
         seconds: How long to simulate [s].
         every_frame: See `perform`, as the next.
-        controls: What a page asks.
+        controls: Requests of a page.
         stop: The signals.
-        checkpoints: Those of the run.
+        checkpoints: Checkpoints of the run.
     """
-    hand = None if controls is None else controls.hand
+    simulation, outputs, hand = run.simulation, run.outputs, run.hand
     resumption = outputs.resumption
     repeated = None if resumption is None else RepeatedFrames(resumption, outputs.folder)
 
@@ -298,11 +238,11 @@ def _run_frames(
     def after_frame(now: Simulation) -> bool:
         if repeated is not None:
             repeated.check(now.recording)
-        is_due = checkpoints.are_due
+        is_due = checkpoints.is_due(len(now.recording))
         if is_due or outputs.are_rows_due(now.recording):
             write_rows()
         if is_due:
-            checkpoints.write()
+            checkpoints.write_now()
         if every_frame is not None:
             every_frame(now)
         obey()
@@ -320,12 +260,14 @@ def _run_frames(
             link.while_waiting = give_up
         obey()
         if stop.reason is None:
-            if checkpoints.are_due:
-                checkpoints.write()
+            if checkpoints.is_due(len(simulation.recording)):
+                checkpoints.write_now()
             simulation.run(seconds, after_frame)
         if stop.reason is not None:
             write_rows()
-            checkpoints.write_last()
+            if checkpoints.are_wanted:
+                checkpoints.write_now()
+            checkpoints.finish()
         if isinstance(link, TcpLink):  # what it answers for the last files may be long
             link.while_waiting = lambda: None
     except Exception as error:
@@ -335,10 +277,8 @@ def _run_frames(
     return None
 
 
-def _status_of(stopped: str | None, failure: Exception | None, controls: RunControls | None) -> str:
-    """Return how a run ended, for its summary."""
-    if stopped is not None:
-        return stopped
+def _status_of(failure: Exception | None, controls: RunControls | None) -> str:
+    """Return how a run ended without a signal, for its summary."""
     if failure is not None:
         return f"failed: {one_line(failure)}"
     is_cut_short = controls is not None and controls.hand is None and controls.has_ended
@@ -354,12 +294,8 @@ def _has_rested(simulation: Simulation, hand: Teleoperation) -> bool:
     return len(simulation.recording) >= n_frames
 
 
-def _scene_to_write(
-    scene: Scene | None, hand: Teleoperation | None, outputs: Outputs
-) -> Scene | None:
-    """Return the scene that repeats what will have been done."""
-    if scene is None or hand is None:
-        return scene
+def _repeated(scene: Scene, outputs: Outputs) -> Scene:
+    """Return the scene that repeats what a hand will have done."""
     recorded = StrokeTable(kind="recorded", file=str(outputs.path(STROKE)))
     graspers = [
         structs.replace(each, motion=[], recorded=str(outputs.path(grasp_file(each.name))))

@@ -1,55 +1,27 @@
 """The end of a run: all that was done goes to its folder, whatever ended it."""
 
 import logging
+from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import RunError, one_line
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.export import export_surface
-from scalpel_sim.output.run_outcome import outcome_of
+from scalpel_sim.output.run_outcome import COMPLETE, RunOutcome, outcome_of
 from scalpel_sim.output.run_warnings import RunWarning, warnings_of
-from scalpel_sim.output.summary import RunFacts, Summary, summarise
+from scalpel_sim.output.summary import Summary, summarise
 from scalpel_sim.runs.file_names import FINAL, FORCES, PLOT, REPLAY, SUMMARY
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.pictures import add_to
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import Snapshot, pieces_of
+from tissue import Snapshot
 
 _log = logging.getLogger(__name__)
 
 _LED = "what the hands did"
-
-
-class RunStart(NamedTuple):
-    """Facts of a run before its first frame: later the link may be lost."""
-
-    body: TissueDescription
-    title: str
-    """Heading of the plots."""
-    first: Snapshot
-    """The body as it lies then."""
-    asked: float | None
-    """The area that the stroke is to cut [m2]; None where that is not known."""
-
-
-class EndedRun(NamedTuple):
-    """A run whose last frame is done."""
-
-    simulation: Simulation
-    outputs: Outputs
-    replay: ReplayWriter
-    hand: Teleoperation | None
-    """Teleoperation of the blade; None: a script led it."""
-    start: RunStart
-    settings: dict[str, Any]
-    """Settings to keep in the summary."""
-    status: str
-    """`complete`, or what ended the run before its time."""
-    failure: Exception | None
-    """The error that ended it, or None."""
 
 
 class Attempts:
@@ -89,13 +61,40 @@ class Attempts:
         return True
 
 
-def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
-    """Write the last files of a run, each of which may fail; return what was tried.
+@dataclass
+class OpenRun:
+    """A run between its first and its last file."""
+
+    simulation: Simulation
+    outputs: Outputs
+    replay: ReplayWriter
+    settings: dict[str, Any]
+    """Settings for the summary."""
+    hand: Teleoperation | None
+    """Teleoperation of the blade; None: a script leads it."""
+
+    def __post_init__(self) -> None:
+        link = self.simulation.link  # later it may be lost
+        self.body: TissueDescription = link.describe()
+        self.title = self.simulation.title
+        """Heading of the plots."""
+        self.first: Snapshot = link.snapshot()
+        """The body before the first frame."""
+        self.status = COMPLETE
+        """`complete`, or what ended the run before its time."""
+        self.failure: Exception | None = None
+        """Error that ended the frames."""
+        self.attempts = Attempts()
+        """Attempts to write the last files."""
+
+
+def write_end(run: OpenRun) -> Summary:
+    """Write the last files of a run, each of which may fail.
 
     The body comes first, and what can be made again from the other files last.
     """
     simulation, outputs = run.simulation, run.outputs
-    attempts = Attempts(run.failure)
+    run.attempts = attempts = Attempts(run.failure)
     with attempts.of("the space that was kept"):
         outputs.free_reserve()
     with attempts.of(FORCES):
@@ -106,13 +105,17 @@ def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
             write_driven(outputs, run.hand)
     with attempts.of(FORCES):
         outputs.write_pending()
-    summary = summarise(simulation.recording, _facts(run, attempts))
+    outcome, warnings = _outcome(run), list[RunWarning]()
+    if outcome.last is not None and outcome.report is not None:
+        with attempts.of("the warnings"):
+            warnings = warnings_of(outcome)
+    summary = summarise(outcome, warnings)
     with attempts.of(SUMMARY):
         outputs.write_summary(summary)
-    for warning in summary.warnings:
-        _log.warning("%s", warning["message"])
+    for warning in warnings:
+        _log.warning("%s", warning.message)
     with attempts.of(PLOT):
-        outputs.start_plots(run.start.title)  # by another process, while this one writes the replay
+        outputs.start_plots(run.title)  # by another process, while this one writes the replay
     with attempts.of("the last picture"):
         add_to(run.replay, simulation)
     with attempts.of(REPLAY):
@@ -122,7 +125,7 @@ def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
             export_surface(simulation.link.surface(), path)
     with attempts.of(PLOT):
         outputs.finish_plots()
-    return summary, attempts
+    return summary
 
 
 def write_driven(outputs: Outputs, hand: Teleoperation) -> None:
@@ -143,38 +146,16 @@ def write_driven(outputs: Outputs, hand: Teleoperation) -> None:
         raise attempts.errors[0]
 
 
-def _facts(run: EndedRun, attempts: Attempts) -> RunFacts:
-    """Write the final mesh, and return the facts of the run."""
-    simulation, link, bridge = run.simulation, run.simulation.link, run.simulation.bridge
-    last = pieces = quality = None
-    with attempts.of(FINAL):
-        last = link.snapshot()
+def _outcome(run: OpenRun) -> RunOutcome:
+    """Write the final mesh, and return the outcome of the run."""
+    last = report = None
+    with run.attempts.of(FINAL):
+        last = run.simulation.link.snapshot()
         run.outputs.write_mesh(FINAL, last)
-        pieces = pieces_of(last)
-    if FINAL not in attempts.unwritten:
-        with attempts.of("the quality of the cut"):
-            quality = link.cut_report()
-    warnings: list[RunWarning] = []
-    if last is not None and quality is not None:
-        with attempts.of("the warnings"):
-            known = run.settings, run.start.body, run.start.first
-            warnings = warnings_of(outcome_of(simulation, *known, last, quality.node_size))
-    return RunFacts(
-        scene=run.start.body.scene,
-        status=run.status,
-        dt=simulation.dt,
-        wall_seconds=simulation.wall_seconds,
-        tetrahedra_initial=run.start.body.n_tetrahedra,
-        tetrahedra_final=(bridge.result or run.start.body).n_tetrahedra,
-        pieces=pieces,
-        quality=quality,
-        asked_area=run.start.asked,
-        counters=bridge.counters.as_numbers(),
-        touched=simulation.touching.frames,
-        settings=run.settings,
-        held_points=[load.n_points for load in bridge.frame_loads],
-        warnings=[warning.as_numbers() for warning in warnings],
-    )
+    if FINAL not in run.attempts.unwritten:
+        with run.attempts.of("the quality of the cut"):
+            report = run.simulation.link.cut_report()
+    return outcome_of(run.simulation, run.settings, run.body, run.first, last, report, run.status)
 
 
 def _about(name: str, error: Exception) -> str:

@@ -10,7 +10,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from scalpel_sim.output.summary import COMPLETE
+from scalpel_sim.output.run_outcome import COMPLETE
 from scalpel_sim.recording.recording import read_forces
 from tests.scalpel_sim.output.killed_runs import figures, physics
 from tests.support.battery import battery

@@ -79,7 +79,7 @@ def run(scene, link=None):
     first, known = simulation.link.snapshot(), simulation.link.describe()
     simulation.run(run_time(simulation, scene.seconds))
     last, report = simulation.link.snapshot(), simulation.link.cut_report()
-    return outcome_of(simulation, scene.settings(), known, first, last, report.node_size)
+    return outcome_of(simulation, scene.settings(), known, first, last, report)
 
 
 @functools.cache

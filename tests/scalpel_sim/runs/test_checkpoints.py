@@ -62,7 +62,7 @@ def test_one_is_due_after_so_many_frames(tmp_path):
 
 def test_those_of_what_was_undone_are_removed_and_one_is_due(tmp_path):
     with written(tmp_path, 100, 200) as checkpoints:
-        checkpoints.go_on_from(150)
+        checkpoints.cut_back(150)
         assert frames_in(tmp_path) == [100]
         assert checkpoints.is_due(150)
 
@@ -71,7 +71,7 @@ def test_a_run_that_goes_on_replaces_the_older_one(tmp_path):
     written(tmp_path, 100, 200).close()
     with Checkpoints(tmp_path, 100) as checkpoints:
         checkpoints.read()
-        checkpoints.go_on_from(200)
+        checkpoints.cut_back(200)
         assert not checkpoints.is_due(299)
         checkpoints.write(lambda: checkpoint(300))
     assert frames_in(tmp_path) == [300, 200]

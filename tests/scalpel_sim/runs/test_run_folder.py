@@ -3,6 +3,7 @@ import functools
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,13 +22,14 @@ from scalpel_sim.output.plots import (
     plot_forces,
 )
 from scalpel_sim.output.report import print_summary
-from scalpel_sim.output.summary import RunFacts, Summary, summarise, summary_json
+from scalpel_sim.output.run_outcome import RunOutcome
+from scalpel_sim.output.summary import Summary, summarise, summary_json
 from scalpel_sim.recording.columns import columns_in, grasper_quantities, shared_columns
 from scalpel_sim.recording.recording import TERMS, Recording, read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, FORCES, PLOT, SUMMARY
 from scalpel_sim.runs.run_folder import FRAMES_PER_FLUSH, Outputs
 from tests.support.run_files import names_in
-from tissue import CutReport, Energies, MeshMeasures, Snapshot, pieces_of
+from tissue import CutReport, Energies, MeshMeasures, Snapshot
 
 DT = 1e-3
 CUT_REPORT = CutReport(
@@ -42,14 +44,12 @@ CUT_REPORT = CutReport(
 
 
 @functools.cache
-def pieces():
+def body():
     """Return two tetrahedra, the second of which is held."""
     corners = np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)])
     tetrahedra = np.array([[3, 0, 1, 2], [7, 4, 5, 6]])
     is_held = np.arange(8) == 4
-    return pieces_of(
-        Snapshot(corners, corners.copy(), np.zeros((8, 3)), np.ones(8), tetrahedra, is_held)
-    )
+    return Snapshot(corners, corners.copy(), np.zeros((8, 3)), np.ones(8), tetrahedra, is_held)
 
 
 @pytest.fixture(scope="module")
@@ -72,21 +72,21 @@ def summary_of(
     recording: Recording, wall_seconds: float = 1.0, material: Any = None, **counters: Any
 ) -> Summary:
     return summarise(
-        recording,
-        RunFacts(
-            scene="block",
-            status="complete",
-            dt=DT,
+        RunOutcome(
+            recording,
+            DT,
+            stroke=None,
+            frame=None,
+            settings={"stroke": "straight", "material": material or {}},
+            tissue=SimpleNamespace(scene="block", n_tetrahedra=6),
+            first=None,
+            last=body(),
+            report=CUT_REPORT,
             wall_seconds=wall_seconds,
-            tetrahedra_initial=6,
             tetrahedra_final=8,
-            pieces=pieces(),
-            quality=CUT_REPORT,
             asked_area=2.5e-4,
             counters=counters,
-            touched={},
-            settings={"stroke": "straight", "material": material or {}},
-        ),
+        )
     )
 
 
