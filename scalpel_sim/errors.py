@@ -1,7 +1,9 @@
 """Errors that a user can act on, and the exit code that each one means."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 EXIT_OK = 0
 EXIT_RUN_FAILED = 1
@@ -40,6 +42,24 @@ def one_line(error: Exception) -> str:
     if isinstance(error, EXPECTED):
         return text
     return f"{type(error).__name__}: {text}. This is a fault of the program; -v shows where"
+
+
+@contextmanager
+def writing(path: Path, instead: str) -> Iterator[None]:
+    """Turn an error of the system into one line that names the path that cannot be written.
+
+    Args:
+        path: The file or folder.
+        instead: What to choose where it cannot be written.
+
+    Raises:
+        RunError: the system refuses.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RunError(f"{path}: cannot be written ({reason}); choose {instead}") from error
 
 
 def exit_code(error: BaseException) -> int:

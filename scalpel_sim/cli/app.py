@@ -30,7 +30,6 @@ from scalpel_sim.errors import (
     one_line,
 )
 from scalpel_sim.figures.command import figure
-from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.console import (
     expect_no_warnings,
     log_to_stderr,
@@ -99,11 +98,11 @@ def _run(
             connects, at real-time speed. The motion is then advanced by --relaxation verlet, unless
             you choose another or the tissue stiffens.
     """
-    with log_to_stderr(printing), Plotter() as plotter:  # it loads while the run is prepared
+    with log_to_stderr(printing):
         from scalpel_sim.cli.resumed_run import perform_resumed
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.runs.device_run import check_device_options, device_run, perform_device
-        from scalpel_sim.runs.prepared_run import perform_script
+        from scalpel_sim.runs.run import perform
         from scalpel_sim.scene.case import is_case
         from scalpel_sim.tables.text_files import is_toml_file
 
@@ -115,7 +114,7 @@ def _run(
                     "--resume goes on with the run in its folder; omit the scene and --hand"
                 )
             check_device_options(device, is_led=False)
-            summary, resumed = perform_resumed(output.resume, options, plotter)
+            summary, resumed = perform_resumed(output.resume, options)
             print_report(summary, resumed.folder, output.export, printing)
             expect_no_warnings(summary, output)
             return
@@ -134,9 +133,9 @@ def _run(
         ) as prepared:
             if is_led:
                 with device_run(prepared, device) as led:
-                    summary = perform_device(prepared, plotter, led)
+                    summary = perform_device(prepared, led)
             else:
-                summary = perform_script(prepared, plotter)
+                summary = perform(prepared)
             print_report(summary, prepared.folder, output.export, printing)
         expect_no_warnings(summary, output)
 

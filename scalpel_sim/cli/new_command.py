@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.errors import UsageError, writing
 from scalpel_sim.runs.console import log_to_stderr
 from scalpel_sim.runs.options import OUTPUT, Flag, PrintOptions
 from tissue.support import new_whole_file, whole_file
@@ -59,14 +59,11 @@ def write_new_file(path: Path, text: str, *, force: bool, instead: str) -> None:
         RunError: the system refuses.
     """
     placed = whole_file if force else new_whole_file
-    try:
-        with placed(path) as unfinished:
-            unfinished.write_text(text, encoding="utf-8")
-    except FileExistsError as error:
-        raise UsageError(
-            f"{path} exists already; choose another file, or add --force to replace it"
-        ) from error
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose {instead}"
-        ) from error
+    with writing(path, instead):
+        try:
+            with placed(path) as unfinished:
+                unfinished.write_text(text, encoding="utf-8")
+        except FileExistsError as error:
+            raise UsageError(
+                f"{path} exists already; choose another file, or add --force to replace it"
+            ) from error

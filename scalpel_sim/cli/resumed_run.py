@@ -6,19 +6,17 @@ from pathlib import Path
 from scalpel_sim.cli.options import expect_no_options
 from scalpel_sim.cli.run_setup import RunOptions, prepared_run
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.runs.file_names import SCENE
-from scalpel_sim.runs.prepared_run import PreparedRun, perform_script
+from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.resumption import Resumption, resumption_of
+from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import check_folder
 from scalpel_sim.scene.read import read_scene
 from tissue.support import whole_file
 
 
-def perform_resumed(
-    folder: Path, options: RunOptions, plotter: Plotter
-) -> tuple[Summary, PreparedRun]:
+def perform_resumed(folder: Path, options: RunOptions) -> tuple[Summary, PreparedRun]:
     """Go on with a run, and return its summary and what it was.
 
     A run that a hand led goes on with what the hand did until it was killed, and then rests.
@@ -26,7 +24,6 @@ def perform_resumed(
     Args:
         folder: The folder of its files.
         options: What the command line asks for.
-        plotter: Draws the plots.
 
     Raises:
         UsageError: there is no such run, it is complete, or an option does not go with it.
@@ -51,7 +48,7 @@ def perform_resumed(
         exports = tuple(map(Path, resumption.plan.exports))
     options = options._replace(output=replace(options.output, out=folder, export=exports))
     with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
-        return perform_script(prepared, plotter, resumption=resumption), prepared
+        return perform(prepared, resumption=resumption), prepared
 
 
 def _end_records(folder: Path, resumption: Resumption) -> None:

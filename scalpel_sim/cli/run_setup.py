@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +11,7 @@ from scalpel_sim.cli.options import ArmOptions, MaterialOptions, TissueOptions, 
 from scalpel_sim.cli.scene_options import chosen_scene, led_elsewhere, scene_in_file
 from scalpel_sim.errors import Interrupted, UsageError
 from scalpel_sim.output.export import check_exports
+from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.preparation.tissue import check_scene, make_tissue
 from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
@@ -80,27 +81,25 @@ def prepared_run(
         LinkError: the tissue is elsewhere, and cannot be reached.
         Interrupted: a signal came before it was prepared.
     """
-    try:
-        link, scene, simulation, settings = _prepared(
-            name, options, audits=audits, relaxation=relaxation, is_led=is_led
-        )
-    except KeyboardInterrupt as error:
-        raise Interrupted(f"{error} before the run began; no file was written") from error
-    try:
-        settings |= {"arm": simulation.arm.name}
-        folder, every = _folder(options.output, scene), _checkpoint_seconds(options)
+    with Plotter() as plotter, ExitStack() as stack:  # it loads while the run is prepared
+        try:
+            link, scene, simulation, settings = _prepared(
+                name, options, audits=audits, relaxation=relaxation, is_led=is_led
+            )
+        except KeyboardInterrupt as error:
+            raise Interrupted(f"{error} before the run began; no file was written") from error
+        stack.callback(link.close)
         yield PreparedRun(
             simulation,
             scene,
-            folder,
-            settings,
-            every,
+            _folder(options.output, scene),
+            settings | {"arm": simulation.arm.name},
+            plotter,
+            _checkpoint_seconds(options),
             options.output.export,
             options.client.connect is None,
             options.printing,
         )
-    finally:
-        link.close()
 
 
 def _prepared(

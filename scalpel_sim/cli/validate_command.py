@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from scalpel_sim.errors import CheckError, RunError, UsageError
+from scalpel_sim.errors import CheckError, UsageError, writing
 from scalpel_sim.runs.console import log_to_stderr, say
 from scalpel_sim.runs.options import PrintOptions
 from tissue.support import whole_file
@@ -174,7 +174,7 @@ def _write(folder: Path, runs: Sequence["SceneRun"], text: str, *, quick: bool) 
     from scalpel_sim.validate.report import draw_plot, validation_page
 
     names: dict[str, list[str]] = {}
-    try:
+    with writing(folder, "another --out"):
         for run in runs:
             names[run.scene.name] = []
             for i, plot in enumerate(run.findings.plots):
@@ -185,8 +185,3 @@ def _write(folder: Path, runs: Sequence["SceneRun"], text: str, *, quick: bool) 
         for name, content in ((JSON_FILE, text + "\n"), (PAGE_FILE, page)):
             with whole_file(folder / name) as unfinished:
                 unfinished.write_text(content, encoding="utf-8")
-    except OSError as error:
-        raise RunError(
-            f"{error.filename or folder}: cannot be written ({error.strerror or error}); "
-            "choose another --out"
-        ) from error

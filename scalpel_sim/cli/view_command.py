@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions, with_values
-from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.console import log_to_stderr
 from scalpel_sim.runs.options import (
     ClientOptions,
@@ -50,17 +49,13 @@ def view(
     Args:
         scene: What to cut.
     """
-    with log_to_stderr(printing), Plotter() as plotter:
+    with log_to_stderr(printing):
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
-        from scalpel_sim.runs.device_run import check_device_options, view_device
+        from scalpel_sim.runs.device_run import check_device_options
         from scalpel_sim.runs.live_session import LiveSession
 
         options = RunOptions(tissue, arm, client, output, printing)
-        is_led = page.hand == "device"
-        check_device_options(device, is_led=is_led)
-        if is_led:
-            with prepared_run(scene, options, relaxation="verlet", is_led=True) as prepared:
-                return view_device(prepared, page, device, plotter)
+        check_device_options(device, is_led=page.hand == "device")
 
         def prepare(asked: "Begin") -> AbstractContextManager["PreparedRun"]:
             return prepared_run(
@@ -70,7 +65,7 @@ def view(
                 is_led=asked.is_led,
             )
 
-        with LiveSession(prepare, page, plotter) as session:
+        with LiveSession(prepare, page, device) as session:
             session.perform()
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.errors import UsageError, writing
 from tissue import BoolArray, FloatArray, IntArray, Surface
 from tissue.support import whole_file
 
@@ -50,13 +50,8 @@ def export_surface(surface: Surface, path: Path) -> None:
     write = _WRITERS.get(path.suffix.lower())
     if write is None:
         raise _unknown_ending(path)
-    try:
-        with whole_file(path) as unfinished:
-            unfinished.write_bytes(write(surface))
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another --export"
-        ) from error
+    with writing(path, "another --export"), whole_file(path) as unfinished:
+        unfinished.write_bytes(write(surface))
 
 
 def check_exports(paths: Iterable[Path]) -> None:
@@ -91,15 +86,10 @@ def check_file(path: Path, suffix: str, option: str) -> None:
         reason = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
         raise UsageError(f"{option} is {path}, and {reason}; choose another file")
     is_new = not path.exists()
-    try:
-        with path.open("ab"):
-            pass
+    with writing(path, f"another {option}"):
+        path.open("ab").close()
         if is_new:
             path.unlink()
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another {option}"
-        ) from error
 
 
 def surface_pieces(surface: Surface) -> list[SurfacePiece]:

@@ -1,12 +1,13 @@
-"""The table that a run prints, with the paper's figures beside ours where there are any."""
+"""The table that a run prints. `bench table1` compares with the paper's figures."""
 
+from collections.abc import Iterator
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.output.run_outcome import COMPLETE
-from scalpel_sim.output.summary import TABLE_1, Summary
+from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.recording import TERMS
 from tissue import LAWS
 
@@ -33,9 +34,6 @@ _MM2_PER_M2 = 1e6
 _MJ_PER_J = 1e3
 
 
-_PAPER = {"grid2": TABLE_1[2, 2, 2], "slab": TABLE_1[4, 6, 4]}
-"""Rows of the paper's Table 1 by scene. The paper has no such figures for the other bodies."""
-
 SATURATIONS = {
     "force_limited": "force above the device's limit",
     "torque_limited": "torque above the device's limit",
@@ -55,44 +53,60 @@ WORKS = {
 """The works of the account, and their labels."""
 
 
-class _Rows:
-    """The table of a run, with a column of the paper's figures where there are any."""
-
-    def __init__(self, summary: Summary) -> None:
-        self.paper = _PAPER.get(summary.scene)
-        self.table = Table(
-            title=f"{summary.scene}: {summary.settings['stroke']} stroke",
-            title_justify="left",
-            show_header=self.paper is not None,
-        )
-        self.table.add_column(style="bold")
-        self.table.add_column("this run" if self.paper else "", justify="right")
-        if self.paper is not None:
-            self.table.add_column("paper (1998)", justify="right", style="dim")
-
-    def add(self, label: str, ours: str, theirs: str = "") -> None:
-        """Add a row; `theirs` is left out where the paper has no figures for the scene."""
-        self.table.add_row(label, ours, *([theirs] if self.paper else []))
+_Rows = Iterator[tuple[str, str]]
+"""Labels and figures."""
 
 
 def print_summary(summary: Summary, console: Console) -> None:
     """Print the figures of a run as a table."""
-    rows = _Rows(summary)
-    if summary.status != COMPLETE:
-        rows.add("status", summary.status)
-    rows.add("simulated time", f"{summary.simulated_seconds:.3f} s")
-    rows.add("real-time factor", _speed(summary))
-    _add_mesh(rows, summary)
-    if "springs" in summary.settings:
-        _add_springs(rows, summary.settings["springs"])
-    _add_cut(rows, summary)
-    _add_counters(rows, summary.counters)
-    _add_times(rows, summary)
-    console.print(rows.table)
+    table = _table(f"{summary.scene}: {summary.settings['stroke']} stroke", n_figures=1)
+    for label, figure in _figures(summary):
+        table.add_row(label, figure)
+    table.add_section()
+    for stage, name in STAGE_NAMES.items():
+        table.add_row(f"{stage}  {name}", f"{summary.share[stage]:.1%}")
+    table.add_row("other (arm, bridge)", f"{summary.share['other']:.1%}")
+    console.print(table)
     if summary.warnings:
-        console.print(_warnings(summary.warnings))
+        warnings = Table(title="warnings", title_justify="left", show_header=False, show_lines=True)
+        warnings.add_column(style="bold", no_wrap=True)
+        for warning in summary.warnings:
+            warnings.add_row(warning["kind"], warning["message"])
+        console.print(warnings)
     if summary.energies_j is not None:
         console.print(_account(summary.energies_j, summary.residual_of_work))
+
+
+def _table(title: str, n_figures: int) -> Table:
+    """Return an empty table of a label and some figures a row."""
+    table = Table(title=title, title_justify="left", show_header=False)
+    table.add_column(style="bold")
+    for _ in range(n_figures):
+        table.add_column(justify="right")
+    return table
+
+
+def _figures(summary: Summary) -> _Rows:
+    """Yield all figures but the shares of the stages."""
+    if summary.status != COMPLETE:
+        yield "status", summary.status
+    yield "simulated time", f"{summary.simulated_seconds:.3f} s"
+    yield "real-time factor", _speed(summary)
+    yield "tetrahedra before", f"{summary.tetrahedra_initial:,}"
+    yield "tetrahedra after", f"{summary.tetrahedra_final:,}"
+    yield "pieces", "unknown" if summary.pieces is None else str(summary.pieces)
+    for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
+        volume, mass = piece["volume_m3"] * CM3_PER_M3, piece["mass_kg"] * G_PER_KG
+        held = "held" if piece["held"] else "loose"
+        yield f"piece {number}, {held}", f"{volume:.3g} cm³, {mass:.3g} g"
+    if summary.quality is not None:
+        yield from _quality(summary.quality)
+    if "springs" in summary.settings:
+        yield from _springs(summary.settings["springs"])
+    yield from _cut(summary)
+    yield from _counters(summary.counters)
+    yield "frames/s, median", f"{summary.frame_rate_median:,.0f}"
+    yield "frames/s, 99th percentile", f"{summary.frame_rate_p99:,.0f}"
 
 
 def _speed(summary: Summary) -> str:
@@ -112,28 +126,8 @@ def _speed(summary: Summary) -> str:
     return f"{factor}: slower than real time{hint}"
 
 
-def _add_mesh(rows: _Rows, summary: Summary) -> None:
-    """Add the size of the mesh, the pieces, and the quality of the cut."""
-    paper = rows.paper
-    rows.add(
-        "tetrahedra before",
-        f"{summary.tetrahedra_initial:,}",
-        f"{paper.tetrahedra_initial:,}" if paper else "",
-    )
-    rows.add(
-        "tetrahedra after",
-        f"{summary.tetrahedra_final:,}",
-        f"{paper.tetrahedra_final:,}" if paper else "",
-    )
-    rows.add("pieces", "unknown" if summary.pieces is None else str(summary.pieces))
-    for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
-        rows.add(f"piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
-    if summary.quality is not None:
-        _add_quality(rows, summary.quality)
-
-
-def _add_quality(rows: _Rows, quality: dict[str, float]) -> None:
-    """Add the distance of the cut from the blade's path, and its effect on mesh and time step."""
+def _quality(quality: dict[str, float]) -> _Rows:
+    """Yield the distance of the cut from the blade's path, and its effect on mesh and time step."""
     mean, largest, altitude, before = (
         f"{quality[name] * _MM_PER_M:.3g}"
         for name in (
@@ -144,99 +138,75 @@ def _add_quality(rows: _Rows, quality: dict[str, float]) -> None:
         )
     )
     sizes = quality["path_error_mean_node_sizes"], quality["path_error_largest_node_sizes"]
-    rows.add("path error, mean", f"{mean} mm, {sizes[0]:.2g} node sizes")
-    rows.add("path error, largest", f"{largest} mm, {sizes[1]:.2g} node sizes")
+    yield "path error, mean", f"{mean} mm, {sizes[0]:.2g} node sizes"
+    yield "path error, largest", f"{largest} mm, {sizes[1]:.2g} node sizes"
     guards = quality["smallest_altitude_m"] / quality["guard_m"] if quality["guard_m"] > 0.0 else 0
-    rows.add(
-        "smallest altitude", f"{altitude} mm" + (f", {guards:.2g} x the guard" if guards else "")
-    )
-    rows.add("smallest altitude before", f"{before} mm")
-    rows.add("growth of tetrahedra", f"{quality['tetrahedra_growth']:.2f}")
-    rows.add("growth of the frequency bound", f"{quality['frequency_growth']:.2f}")
-    rows.add("growth of substeps", f"{quality['substep_growth']:.2f}")
-    rows.add("mass added to light nodes", f"{1e2 * quality['added_mass']:.2g} %")
+    yield "smallest altitude", f"{altitude} mm" + (f", {guards:.2g} x the guard" if guards else "")
+    yield "smallest altitude before", f"{before} mm"
+    yield "growth of tetrahedra", f"{quality['tetrahedra_growth']:.2f}"
+    yield "growth of the frequency bound", f"{quality['frequency_growth']:.2f}"
+    yield "growth of substeps", f"{quality['substep_growth']:.2f}"
+    yield "mass added to light nodes", f"{1e2 * quality['added_mass']:.2g} %"
     if quality["most_added_mass"] > quality["added_mass"]:
-        rows.add("the most in the run", f"{1e2 * quality['most_added_mass']:.2g} %")
+        yield "the most in the run", f"{1e2 * quality['most_added_mass']:.2g} %"
     if quality["inverted"] > 0.0:
-        rows.add("tetrahedra inside out", f"{1e2 * quality['inverted']:.2g} %")
+        yield "tetrahedra inside out", f"{1e2 * quality['inverted']:.2g} %"
 
 
-def _add_springs(rows: _Rows, springs: dict[str, float]) -> None:
-    """Add the elastic constants of the springs on this mesh."""
+def _springs(springs: dict[str, float]) -> _Rows:
+    """Yield the elastic constants of the springs on this mesh."""
     mean, softest, stiffest = (
         springs[f"young_modulus_{which}pa"] * _KPA_PER_PA for which in ("", "softest_", "stiffest_")
     )
     error = springs["young_modulus_error"]
-    rows.add("springs: Young's modulus", f"{mean:.3g} kPa, {error:+.1%}")
-    rows.add("springs: by direction", f"{softest:.3g} to {stiffest:.3g} kPa")
-    rows.add("springs: Poisson's ratio", f"{springs['poisson_ratio']:.2f}")
+    yield "springs: Young's modulus", f"{mean:.3g} kPa, {error:+.1%}"
+    yield "springs: by direction", f"{softest:.3g} to {stiffest:.3g} kPa"
+    yield "springs: Poisson's ratio", f"{springs['poisson_ratio']:.2f}"
 
 
-def _add_cut(rows: _Rows, summary: Summary) -> None:
-    """Add the area of the cut, the forces, the collisions and the work."""
+def _cut(summary: Summary) -> _Rows:
+    """Yield the area of the cut, the forces, the collisions and the work."""
     asked = summary.asked_area_m2
     share = f", {summary.cut_area_m2 / asked:.0%} of what is asked" if asked else ""
-    rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²{share}")
+    yield "cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²{share}"
     if summary.finished_area_m2 > 0.0:
         finished = f"{summary.finished_area_m2 * _MM2_PER_M2:,.1f} mm² of the cut, at no work"
-        rows.add("bridges finished", finished)
+        yield "bridges finished", finished
     paid, cut = summary.cut_area_paid_m2, summary.cut_area_m2
     if paid is not None and cut > 0.0:
         off = f": more than {LARGEST_GAP:.0%} off" if abs(paid / cut - 1.0) > LARGEST_GAP else ""
         share = f"{paid / cut:.0%} of the cut{off}"
-        rows.add("area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {share}")
-    rows.add("peak force", f"{summary.force_peak_n:.3f} N")
-    rows.add("mean force", f"{summary.force_mean_n:.3f} N")
+        yield "area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {share}"
+    yield "peak force", f"{summary.force_peak_n:.3f} N"
+    yield "mean force", f"{summary.force_mean_n:.3f} N"
     for number, each in enumerate(summary.attachments, 1):
         name = f"attachment {number}" + (f", {each['where']}" if each["where"] else "")
         peak, end = each["force_peak_n"], each["force_at_end_n"]
         left = "" if each["points"] else ", let go"
-        rows.add(name, f"{peak:.3f} N at most, {end:.3f} N at the end{left}")
+        yield name, f"{peak:.3f} N at most, {end:.3f} N at the end{left}"
     for hand in summary.hands:
         held = f"{hand['points_held_most']:,} points held at most"
-        rows.add(f"peak force, {hand['name']}", f"{hand['force_peak_n']:.3f} N, {held}")
+        yield f"peak force, {hand['name']}", f"{hand['force_peak_n']:.3f} N, {held}"
     for pair, frames in summary.touched.items():
-        rows.add(f"collision: {pair}", f"{frames:,} frames")
-    rows.add("work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ")
+        yield f"collision: {pair}", f"{frames:,} frames"
+    yield "work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ"
 
 
-def _add_counters(rows: _Rows, counters: dict[str, Any]) -> None:
-    """Add what limited or replaced the answers of the tissue, where anything did."""
+def _counters(counters: dict[str, Any]) -> _Rows:
+    """Yield what limited or replaced the answers of the tissue, where anything did."""
     for name, label in SATURATIONS.items():
         if counters.get(name):
-            rows.add(label, f"{counters[name]:,} frames")
+            yield label, f"{counters[name]:,} frames"
     passivity = counters.get("passivity", {})
     if passivity.get("frames"):
         away = passivity["injected_away"] * _MJ_PER_J
-        rows.add("damped for passivity", f"{passivity['frames']:,} frames, {away:.2g} mJ")
-
-
-def _add_times(rows: _Rows, summary: Summary) -> None:
-    """Add the frame rates, and below a line the shares of the stages."""
-    paper = rows.paper
-    rows.add(
-        "frames/s, median",
-        f"{summary.frame_rate_median:,.0f}",
-        f"{paper.frame_rate} (mean)" if paper else "",
-    )
-    rows.add("frames/s, 99th percentile", f"{summary.frame_rate_p99:,.0f}")
-    rows.table.add_section()
-    for stage, name in STAGE_NAMES.items():
-        rows.add(
-            f"{stage}  {name}",
-            f"{summary.share[stage]:.1%}",
-            f"{paper.percent[stage]} %" if paper else "",
-        )
-    rows.add("other (arm, bridge)", f"{summary.share['other']:.1%}")
+        yield "damped for passivity", f"{passivity['frames']:,} frames, {away:.2g} mJ"
 
 
 def _account(energies: dict[str, float], residual_of_work: float | None) -> Table:
     """Return the energy account as a table; the shares are of the work put in, 100 % in all."""
     work = sum(energies[name] for name in ("work_of_blade", "work_of_loads", "work_of_supports"))
-    table = Table(title="where the work went", title_justify="left", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(justify="right")
-    table.add_column(justify="right")
+    table = _table("where the work went", n_figures=2)
 
     def row(label: str, energy: float, share: float | None) -> None:
         percent = "" if share is None else f"{share:.2%}"
@@ -251,19 +221,3 @@ def _account(energies: dict[str, float], residual_of_work: float | None) -> Tabl
             row(term.label, energies[term.name], energies[term.name] / work if work else None)
     row("not accounted for", energies["residual"], residual_of_work)
     return table
-
-
-def _warnings(warnings: list[dict[str, Any]]) -> Table:
-    """Return what the run was asked for and did not do as a table."""
-    table = Table(title="warnings", title_justify="left", show_header=False, show_lines=True)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    for warning in warnings:
-        table.add_row(warning["kind"], warning["message"])
-    return table
-
-
-def _piece(piece: dict[str, Any]) -> str:
-    """Return the figures of one piece."""
-    volume, mass = piece["volume_m3"] * CM3_PER_M3, piece["mass_kg"] * G_PER_KG
-    return f"{volume:.3g} cm³, {mass:.3g} g"

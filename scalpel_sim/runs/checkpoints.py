@@ -19,11 +19,9 @@ from tissue.support import whole_file
 CHECKPOINT_SECONDS = 1.0
 """Simulated time between two checkpoints, where nothing is said of it [s]."""
 
-_MAGIC = b"scalpel_sim checkpoint 2\n"
+_NAME = b"scalpel_sim checkpoint "
+_MAGIC = _NAME + b"3\n"
 """The first line of the file; its number rises where the form changes."""
-
-_WITHOUT_SUMS = b"scalpel_sim checkpoint 1\n"
-"""The first line of the form that had no checksums of the other files."""
 
 _DIGEST = 32
 """Length of the checksum [bytes]."""
@@ -33,25 +31,19 @@ _LENGTH = struct.Struct("<q")
 _log = logging.getLogger(__name__)
 
 
-class CheckpointHead(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Notes of a checkpoint on its run, besides the state."""
+class Checkpoint(NamedTuple):
+    """A run at the end of a frame."""
 
     plan: RunPlan
     """Request of the run."""
     mark: RunMark
     """How far it had got."""
-
-
-class Checkpoint(NamedTuple):
-    """A run at the end of a frame."""
-
-    head: CheckpointHead
     state: bytes
     """See `SimulationState.to_bytes`."""
 
     def to_bytes(self) -> bytes:
         """Return the content of its file."""
-        head = msgspec.json.encode(self.head)
+        head = msgspec.json.encode(self[:2])
         content = b"".join((_LENGTH.pack(len(head)), head, self.state))
         return b"".join((_MAGIC, _digest(content), content))
 
@@ -62,18 +54,16 @@ class Checkpoint(NamedTuple):
         Raises:
             StateError: it is none, or is not whole.
         """
-        if data.startswith(_WITHOUT_SUMS):
-            raise StateError(
-                "an earlier version of the program wrote it, without checksums of the other files"
-            )
+        if data[: len(_NAME) + 1] in (_NAME + b"1", _NAME + b"2"):
+            raise StateError("an earlier version of the program wrote it")
         begin = len(_MAGIC) + _DIGEST
         content = memoryview(data)[begin:]
         if not data.startswith(_MAGIC) or data[len(_MAGIC) : begin] != _digest(content):
             raise StateError("it is no checkpoint of this version, or a part is missing or damaged")
         (n_bytes,) = _LENGTH.unpack_from(content)
         end = _LENGTH.size + n_bytes
-        head = msgspec.json.decode(content[_LENGTH.size : end], type=CheckpointHead)
-        return cls(head, bytes(content[end:]))
+        head = msgspec.json.decode(content[_LENGTH.size : end], type=tuple[RunPlan, RunMark])
+        return cls(*head, bytes(content[end:]))
 
 
 def read_checkpoint(path: Path) -> Checkpoint | None:
@@ -131,9 +121,9 @@ class Checkpoints:
                     _log.warning("%s; it is left out", error)
                 continue
             if checkpoint is not None:
-                self._frames[slot] = checkpoint.head.mark.n_frames
+                self._frames[slot] = checkpoint.mark.n_frames
                 found.append(checkpoint)
-        return sorted(found, key=lambda each: -each.head.mark.n_frames)
+        return sorted(found, key=lambda each: -each.mark.n_frames)
 
     def cut_back(self, n_frames: int) -> None:
         """Continue after so many frames; the checkpoints of more, which were undone, go."""
@@ -168,7 +158,7 @@ class Checkpoints:
         """
         self.finish()
         checkpoint = make()
-        n_frames = checkpoint.head.mark.n_frames
+        n_frames = checkpoint.mark.n_frames
         slot = min((0, 1), key=lambda each: -1 if (n := self._frames[each]) is None else n)
         self._frames[slot], self._due = n_frames, n_frames + self._every
         self._written = self._thread.submit(self._write, slot, checkpoint)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scalpel_sim.errors import WarnedError
+from scalpel_sim.errors import Interrupted, RunError, WarnedError
 from scalpel_sim.runs.options import PrintOptions, RunOutputOptions
 from scalpel_sim.runs.stop_signals import StopSignals
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:  # an error of use should be printed without waiting for a com
 
 SECONDS_PER_PROGRESS = 0.1
 """Interval at which the progress bar is drawn [s]."""
-SECONDS_PER_CHECK = 0.2
-"""How often a finished `view` checks whether its page is still wanted [s]."""
 SECONDS_PER_LINE = 5.0
 """Interval at which progress is printed where standard error is no terminal [s]."""
 
@@ -161,18 +159,28 @@ def expect_no_warnings(summary: "Summary", options: RunOutputOptions) -> None:
         )
 
 
-def stay_while(
-    condition: Callable[[], bool], message: str, on_wait: Callable[[], None] = lambda: None
+def wait_until(
+    has_begun: Callable[[], bool],
+    what: str,
+    on_wait: Callable[[], None],
+    is_running: Callable[[], bool],
 ) -> None:
-    """Print a message, and return when the condition fails, or on Ctrl-C.
+    """Wait until a run begins.
 
     Args:
-        condition: Whether to go on.
-        message: What to print.
-        on_wait: Called time and again.
+        has_begun: Whether it does.
+        what: What begins it, for messages.
+        on_wait: Called time and again; it takes some milliseconds.
+        is_running: Whether the viewer still runs.
+
+    Raises:
+        Interrupted: the user or the system ended the program before.
+        RunError: the viewer has ended before.
     """
     with StopSignals() as stop:
-        say(message)  # from now on Ctrl-C ends it without a traceback
-        while condition() and stop.reason is None:
+        while not has_begun():
+            if stop.reason is not None:
+                raise Interrupted(f"{stop.reason} before {what}")
+            if not is_running():
+                raise RunError(f"the viewer has ended before {what}")
             on_wait()
-            time.sleep(SECONDS_PER_CHECK)

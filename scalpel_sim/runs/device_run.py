@@ -1,5 +1,6 @@
-"""A run whose blade a device leads, with a page that shows it or without."""
+"""A run whose blade a device leads."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -12,20 +13,17 @@ from bridge import (
     chosen_key,
     parse_address,
 )
-from scalpel_sim.errors import Interrupted, RunError, UsageError
+from scalpel_sim.errors import UsageError
+from scalpel_sim.hands.commands import Command
 from scalpel_sim.hands.device_hand import WATCHDOG, DeviceHand
 from scalpel_sim.hands.limited_pose import MOST_SPEED, MOST_TURN_RATE
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
-from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
-from scalpel_sim.runs.console import print_report, say, stay_while
-from scalpel_sim.runs.options import DeviceOptions, PageOptions
-from scalpel_sim.runs.prepared_run import PreparedRun, perform_by_hand
-from scalpel_sim.runs.stop_signals import StopSignals
+from scalpel_sim.runs.console import say, wait_until
+from scalpel_sim.runs.options import DeviceOptions
+from scalpel_sim.runs.prepared_run import PreparedRun
+from scalpel_sim.runs.run import perform
 from scalpel_sim.scene.checks import LONGEST_RUN
-from scalpel_sim.viewer.messages import PageControls
-from scalpel_sim.viewer.pictures import show_run
-from scalpel_sim.viewer.viewer import Viewer
 
 SECONDS_PER_WAIT = 0.02
 """How often it is looked whether a waiting run is to end [s]."""
@@ -63,8 +61,15 @@ def check_device_options(device: DeviceOptions, *, is_led: bool) -> None:
 
 
 @contextmanager
-def device_run(prepared: PreparedRun, device: DeviceOptions) -> Iterator[DeviceRun]:
+def device_run(
+    prepared: PreparedRun, device: DeviceOptions, commands: deque[Command] | None = None
+) -> Iterator[DeviceRun]:
     """Yield the hand of a run, and the server at which a device can take hold of it.
+
+    Args:
+        prepared: The run.
+        device: Options of the device.
+        commands: Commands of a page; None: there is no page.
 
     Raises:
         ValueError: the address is malformed, or open to other machines and there is no key.
@@ -92,85 +97,37 @@ def device_run(prepared: PreparedRun, device: DeviceOptions) -> Iterator[DeviceR
         key=chosen_key(device.listen_key),
     )
     # A run that stands still serves, too.
-    controls = RunControls(pace, History(simulation), hand, sleep=server.serve_for)
+    controls = RunControls(pace, History(simulation), hand, commands, sleep=server.serve_for)
     with server:
         yield DeviceRun(hand, server, controls)
 
 
 def perform_device(
-    prepared: PreparedRun,
-    plotter: Plotter,
-    led: DeviceRun,
-    check: Callable[[], None] = lambda: None,
+    prepared: PreparedRun, led: DeviceRun, is_running: Callable[[], bool] = lambda: True
 ) -> Summary:
     """Do the run from when a device takes hold of the blade until the stroke is ended.
 
     Args:
         prepared: The run.
-        plotter: Draws the plots.
         led: Its hand and its server.
-        check: Called while it waits; raises an error to end that.
+        is_running: Whether what shows it is still there.
 
     Raises:
         Interrupted: the user or the system ended the run.
-        RunError: the run failed.
+        RunError: nothing shows it any more before a device came; or the run failed.
     """
     hand, server, controls = led
-    with StopSignals() as stop:
-        say(f"waiting for a device at {server.address}")
-        while not hand.has_begun:
-            if stop.reason is not None:
-                raise Interrupted(f"{stop.reason} before a device took hold of the blade")
-            check()
-            server.serve_for(SECONDS_PER_WAIT)
-    summary = perform_by_hand(prepared, plotter, controls)
+    say(f"waiting for a device at {server.address}")
+    wait_until(
+        lambda: hand.has_begun,
+        "a device took hold of the blade",
+        lambda: server.serve_for(SECONDS_PER_WAIT),
+        is_running,
+    )
+    summary = perform(prepared, controls=controls)
     counted = server.state()
     say(
         f"periods missed: {counted.n_missed}, frames limited: {counted.n_limited}, "
         f"messages dropped: {counted.n_dropped}"
     )
     return summary
-
-
-def view_device(
-    prepared: PreparedRun, page: PageOptions, device: DeviceOptions, plotter: Plotter
-) -> None:
-    """Do the run, and show it in the page, which may pause it, slow it down or end it.
-
-    Args:
-        prepared: The run.
-        page: Options of the page.
-        device: Options of the device.
-        plotter: Draws the plots.
-
-    Raises:
-        RunError: the viewer has ended before a device came; or as in `perform_device`.
-    """
-    simulation = prepared.simulation
-    with (
-        device_run(prepared, device) as led,
-        Viewer(
-            simulation.arm.model,
-            title=simulation.title,
-            frame=simulation.frame,
-            wireframe=page.wireframe,
-            port=page.port,
-            views=prepared.scene.views,
-            controls=PageControls(led.controls.commands),
-        ) as viewer,
-    ):
-
-        def check() -> None:
-            if not viewer.is_running:
-                raise RunError("the viewer has ended before a device took hold of the blade")
-
-        show = show_run(viewer, simulation, led.controls)
-        say(f"live at {viewer.url}")
-        summary = perform_device(prepared, plotter, led, check)
-        show()
-        print_report(summary, prepared.folder, prepared.exports, prepared.printing)
-        stay_while(
-            lambda: viewer.is_running,
-            f"{viewer.url} stays until Ctrl-C",
-            led.controls.on_wait,
-        )

@@ -163,7 +163,7 @@ def frame_to_explain(folder: Path, seconds: float) -> ToExplain:
         )
     n_before = int(np.searchsorted(times, seconds + _SAME_INSTANT * dt, side="right")) - 1
     with Checkpoints(folder) as checkpoints:
-        before = [each for each in checkpoints.read() if each.head.mark.n_frames <= n_before]
+        before = [each for each in checkpoints.read() if each.mark.n_frames <= n_before]
     return ToExplain(
         folder, read_scene(folder / SCENE), recorded, n_before, next(iter(before), None)
     )

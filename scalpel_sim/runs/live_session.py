@@ -9,15 +9,16 @@ from contextlib import AbstractContextManager, ExitStack
 from typing import NamedTuple, Self
 
 from bridge import LinkError
-from scalpel_sim.errors import Interrupted, RunError
+from scalpel_sim.errors import RunError
 from scalpel_sim.hands.commands import Begin, Choose, Command, End, Engage, Jaws
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
 from scalpel_sim.hands.teleoperation import LiveHand
-from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
-from scalpel_sim.runs.console import SECONDS_PER_CHECK, print_report, say
-from scalpel_sim.runs.options import PageOptions
-from scalpel_sim.runs.prepared_run import PreparedRun, perform_by_hand, perform_script
+from scalpel_sim.runs.console import print_report, say, wait_until
+from scalpel_sim.runs.device_run import DeviceRun, device_run, perform_device
+from scalpel_sim.runs.options import DeviceOptions, PageOptions
+from scalpel_sim.runs.prepared_run import PreparedRun
+from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.read import SCENES
@@ -28,6 +29,14 @@ from tissue import MATERIALS
 
 _log = logging.getLogger("scalpel_sim")
 
+SECONDS_PER_LOOK = 0.02
+"""Time between two checks whether somebody has taken hold of the blade [s]."""
+
+SECONDS_PER_CHECK = 0.2
+"""Time between two checks whether the page of a run that has ended is still wanted [s]."""
+
+_BEGIN = Engage | Choose | Jaws | End | Begin
+"""Commands with which a run begins."""
 
 PrepareRun = Callable[[Begin], AbstractContextManager[PreparedRun]]
 """Prepares the run that a page asks for; its link is closed when that is left."""
@@ -38,6 +47,8 @@ class _LiveRun(NamedTuple):
 
     asked: Begin
     prepared: PreparedRun
+    device: DeviceRun | None
+    """Device that leads it; None: the page or the script does."""
     controls: RunControls
     show: Callable[[], None]
     """Shows it as it is now."""
@@ -49,15 +60,15 @@ class LiveSession:
     Args:
         prepare: Prepares a run that the page asks for, until its link is closed.
         page: Options of the page.
-        plotter: Draws the plots of the first run. It is closed here.
+        device: Options of the device that leads, if one does.
     """
 
-    def __init__(self, prepare: PrepareRun, page: PageOptions, plotter: Plotter) -> None:
-        self._prepare, self._page, self._plotter = prepare, page, plotter
+    def __init__(self, prepare: PrepareRun, page: PageOptions, device: DeviceOptions) -> None:
+        self._prepare, self._page, self._device = prepare, page, device
         self._commands: deque[Command] = deque()
         self._viewer: Viewer | None = None
         self._open = ExitStack()
-        """The link of the run that is shown."""
+        """The link of the run that is shown, and the server of its device."""
         self._first = ""
         """Name of the scene of the first run."""
         self._n_runs = 0
@@ -69,7 +80,6 @@ class LiveSession:
         if self._viewer is not None:
             self._viewer.close()
         self._open.close()
-        self._plotter.close()
 
     def perform(self) -> None:
         """Do runs until Ctrl-C, or until the viewer has ended.
@@ -80,11 +90,11 @@ class LiveSession:
             Interrupted: the user or the system ended a run.
             RunError: a run failed.
         """
-        run: _LiveRun | None = self._begun(Begin(is_led=self._page.hand == "live"))
+        run: _LiveRun | None = self._begun(Begin(is_led=self._page.hand != "script"))
         while run is not None:
             summary = self._done(run)
             run.show()
-            if summary is not None and self._viewer is not None:
+            if summary is not None:
                 done = run.prepared
                 print_report(summary, done.folder, done.exports, done.printing)
             run = self._after(run, summary is not None)
@@ -94,26 +104,28 @@ class LiveSession:
         with ExitStack() as stack:
             prepared = stack.enter_context(self._prepare(asked))
             if self._n_runs:
-                self._plotter.close()  # it has drawn the plots of one run
-                self._plotter = Plotter()
                 folder = prepared.folder
                 prepared = prepared._replace(
                     folder=folder.with_name(f"{folder.name}-{self._n_runs + 1}")
                 )
-            simulation = prepared.simulation
-            hand = live_hand(prepared) if asked.is_led else None
+            simulation, device = prepared.simulation, None
             self._commands.clear()
-            controls = RunControls(Pace(), History(simulation), hand, self._commands)
+            if self._page.hand == "device":
+                device = stack.enter_context(device_run(prepared, self._device, self._commands))
+                controls = device.controls
+            else:
+                hand = live_hand(prepared) if asked.is_led else None
+                controls = RunControls(Pace(), History(simulation), hand, self._commands)
             show = show_run(self._shown(prepared, asked), simulation, controls)
             before, self._open = self._open, stack.pop_all()
             before.close()
-        return _LiveRun(asked, prepared, controls, show)
+        return _LiveRun(asked, prepared, device, controls, show)
 
     def _shown(self, prepared: PreparedRun, asked: Begin) -> Viewer:
         """Return the viewer, in which the run begins."""
         simulation, scene = prepared.simulation, prepared.scene
-        choices = None
-        if prepared.is_here:
+        choices, is_led_by_device = None, self._page.hand == "device"
+        if prepared.is_here and not is_led_by_device:
             self._first = self._first or scene.name
             choices = Choices(
                 self._first,
@@ -125,7 +137,7 @@ class LiveSession:
                 0.0 if scene.blade is None else scene.blade.thickness,
                 asked.is_led,
             )
-        controls = PageControls(self._commands, asked.is_led, choices)
+        controls = PageControls(self._commands, asked.is_led and not is_led_by_device, choices)
         if self._viewer is None:
             self._viewer = Viewer(
                 simulation.arm.model,
@@ -149,21 +161,39 @@ class LiveSession:
     def _done(self, run: _LiveRun) -> Summary | None:
         """Do a run; None where another was asked for before it began."""
         assert self._viewer is not None
-        prepared, controls = run.prepared, run.controls
-        if run.asked.is_led:
-            summary = perform_live(prepared, self._plotter, self._viewer, controls)
+        prepared, viewer, controls = run.prepared, self._viewer, run.controls
+        if run.device is not None:
+            say(f"live at {viewer.url}")
+            summary = perform_device(prepared, run.device, lambda: viewer.is_running)
+        elif run.asked.is_led and self._is_given_up(controls):
+            return None
         else:
-            if self._n_runs == 0:
-                _wait_for_start(self._viewer.url)
-            controls.pace.go_on()
-            summary = perform_script(
-                prepared,
-                self._plotter,
-                lambda now: controls.pace.wait(now.dt),
-                controls,
-            )
-        self._n_runs += summary is not None
+            if not run.asked.is_led and self._n_runs == 0:
+                _wait_for_start(viewer.url)
+            summary = perform(prepared, controls=controls)
+        self._n_runs += 1
         return summary
+
+    def _is_given_up(self, controls: RunControls) -> bool:
+        """Wait until a page chooses or takes hold; return whether it asks for another run instead.
+
+        Raises:
+            Interrupted: the user or the system ended the program before.
+            RunError: the viewer has ended, and nobody can lead.
+        """
+        assert self._viewer is not None
+        viewer = self._viewer
+
+        def wait() -> None:
+            controls.on_wait()
+            time.sleep(SECONDS_PER_LOOK)
+
+        def has_begun() -> bool:
+            return any(isinstance(command, _BEGIN) for command in list(controls.commands))
+
+        say(f"open {viewer.url} and lead the blade there")
+        wait_until(has_begun, "anybody took hold of the blade", wait, lambda: viewer.is_running)
+        return any(isinstance(command, Begin) for command in list(controls.commands))
 
     def _after(self, run: _LiveRun, has_files: bool) -> _LiveRun | None:
         """Wait until the page asks for another run, and begin it; None: it is not wanted."""
@@ -208,50 +238,7 @@ def _wait_for_start(url: str) -> None:
         say(f"live at {url}")
 
 
-SECONDS_PER_LOOK = 0.02
-"""How often it is looked whether somebody has taken hold of the blade [s]."""
-
-_BEGIN = Engage | Choose | Jaws | End | Begin
-"""Commands with which a run begins."""
-
-
 def live_hand(prepared: PreparedRun) -> LiveHand:
     """Return the hand that leads a run."""
     seconds = prepared.scene.seconds
     return LiveHand(prepared.simulation, seconds=LONGEST_RUN if seconds is None else seconds)
-
-
-def perform_live(
-    prepared: PreparedRun, plotter: Plotter, viewer: Viewer, controls: RunControls
-) -> Summary | None:
-    """Do the run from when somebody takes hold of the blade until they end it.
-
-    Where they ask for another run before, there is none.
-
-    Args:
-        prepared: The run.
-        plotter: Draws the plots.
-        viewer: Its page has shown the start.
-        controls: Obey the commands of that page; they have a hand.
-
-    Raises:
-        Interrupted: the user or the system ended the run.
-        RunError: the viewer has ended, and nobody can lead; or the run failed.
-    """
-    _wait_for_hand(viewer, controls)
-    if any(isinstance(command, Begin) for command in list(controls.commands)):
-        return None
-    return perform_by_hand(prepared, plotter, controls)
-
-
-def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:
-    """Wait until a page chooses or takes hold, or ends the run before it has begun."""
-    with StopSignals() as stop:
-        say(f"open {viewer.url} and lead the blade there")
-        while not any(isinstance(command, _BEGIN) for command in list(controls.commands)):
-            if stop.reason is not None:
-                raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
-            if not viewer.is_running:
-                raise RunError("the viewer has ended before anybody took hold of the blade")
-            controls.on_wait()
-            time.sleep(SECONDS_PER_LOOK)

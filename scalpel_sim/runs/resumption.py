@@ -54,18 +54,18 @@ class Resumption(NamedTuple):
     @property
     def n_frames(self) -> int:
         """Number of frames that are not done again."""
-        return 0 if self.checkpoint is None else self.checkpoint.head.mark.n_frames
+        return 0 if self.checkpoint is None else self.checkpoint.mark.n_frames
 
     @property
     def seconds(self) -> float | None:
         """How long the run is to last [s]; None: as its scene says, or what a hand did."""
-        return None if self.last is None else self.last.seconds
+        return None if self.plan is None else self.plan.seconds
 
     @property
     def replay(self) -> FileSum:
         """How far the frames of the replay had got."""
         checkpoint = self.checkpoint
-        return FileSum() if checkpoint is None else checkpoint.head.mark.written[REPLAY_FRAMES]
+        return FileSum() if checkpoint is None else checkpoint.mark.written[REPLAY_FRAMES]
 
     def put_back_scene(self, folder: Path) -> None:
         """Write `scene.toml` as it was, if it is another one now, which then has another name.
@@ -117,7 +117,7 @@ def resumption_of(folder: Path) -> Resumption:
     with Checkpoints(folder) as checkpoints:
         found = checkpoints.read()
     noted = read_journal(folder / JOURNAL)
-    plan = found[0].head.plan if noted.plan is None and found else noted.plan
+    plan = found[0].plan if noted.plan is None and found else noted.plan
     if not (folder / SCENE).exists() and (plan is None or plan.scene is None):
         raise UsageError(f"--resume {folder}: {_why_no_scene(folder, plan)}")
     if plan is None:
@@ -127,10 +127,10 @@ def resumption_of(folder: Path) -> Resumption:
             folder,
             SCENE,
         )
-    marks = [*(each.head.mark for each in reversed(found)), *noted.marks]
+    marks = [*(each.mark for each in reversed(found)), *noted.marks]
     last = max(reversed(marks), key=lambda mark: mark.written[FORCES].n_bytes, default=None)
     if last is not None:
-        _expect_recorded(folder, last)
+        _expect_recorded(folder, plan, last)
     whole = sums_that_hold(folder / FORCES, (mark.written[FORCES] for mark in marks))
     forces = max(whole, default=FileSum())
     n_journal = [
@@ -156,17 +156,18 @@ def _why_no_scene(folder: Path, plan: RunPlan | None) -> str:
     return "it holds no run"
 
 
-def _expect_recorded(folder: Path, last: RunMark) -> None:
+def _expect_recorded(folder: Path, plan: RunPlan | None, last: RunMark) -> None:
     """Refuse to go on if what a hand did, which the run repeats, is not what it was.
 
     Raises:
         UsageError: it is not; the message names the file.
         OSError: it cannot be read.
     """
-    done = {} if last.seconds is not None else last.written
+    is_led = plan is None or plan.seconds is None
+    done = last.written if is_led else {}
     led = {name: each for name, each in done.items() if name not in (FORCES, REPLAY_FRAMES)}
     other = [name for name, each in led.items() if not sums_that_hold(folder / name, [each])]
-    for name, each in last.read.items():
+    for name, each in ({} if plan is None else plan.read).items():
         if not (folder / name).exists() or sum_of(folder / name) != each:
             other.append(name)
     if other:
@@ -202,10 +203,10 @@ def _last_that_holds(
         found: The checkpoints, the last one first.
         whole: Checksums that hold for `forces.csv`.
     """
-    sums = (each.head.mark.written[REPLAY_FRAMES] for each in found)
+    sums = (each.mark.written[REPLAY_FRAMES] for each in found)
     frames = sums_that_hold(folder / REPLAY_FRAMES, sums)
     for each in found:
-        written = each.head.mark.written
+        written = each.mark.written
         damaged = [
             name
             for name, held in ((FORCES, whole), (REPLAY_FRAMES, frames))
@@ -217,7 +218,7 @@ def _last_that_holds(
             "%s: the checkpoint after frame %d is left out, since %s was changed, damaged or "
             "removed",
             folder,
-            each.head.mark.n_frames,
+            each.mark.n_frames,
             " and ".join(damaged),
         )
     _log.warning("%s: no checkpoint is whole; the run begins again at its start", folder)

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from typing import Any
+from contextlib import nullcontext
 
 from msgspec import structs
 
@@ -13,15 +13,17 @@ from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.run_outcome import COMPLETE
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.growing_file import FileSum, sum_of
-from scalpel_sim.runs.checkpoints import Checkpoint, CheckpointHead, Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints
+from scalpel_sim.runs.console import progress
 from scalpel_sim.runs.file_names import FORCES, INITIAL, REPLAY_FRAMES, SCENE, STROKE, grasp_file
-from scalpel_sim.runs.journal import RunPlan
-from scalpel_sim.runs.resumption import RepeatedFrames
+from scalpel_sim.runs.journal import RunMark, RunPlan
+from scalpel_sim.runs.prepared_run import PreparedRun
+from scalpel_sim.runs.resumption import RepeatedFrames, Resumption
 from scalpel_sim.runs.run_end import OpenRun, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
+from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.write import relative_path, scene_text
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.kind import StrokeTable
@@ -45,13 +47,15 @@ class RunCheckpoints(Checkpoints):
 
     Args:
         run: The run, whose files have begun.
+        plan: Request of the run.
     """
 
-    def __init__(self, run: OpenRun) -> None:
-        self._run = run
+    def __init__(self, run: OpenRun, plan: RunPlan) -> None:
+        self._run, self._plan = run, plan
         outputs, simulation, every = run.outputs, run.simulation, 0
-        if outputs.checkpoint_seconds > 0.0 and isinstance(simulation.link, InProcessLink):
-            every = max(1, round(outputs.checkpoint_seconds / simulation.dt))
+        seconds = run.prepared.checkpoint_seconds
+        if seconds > 0.0 and isinstance(simulation.link, InProcessLink):
+            every = max(1, round(seconds / simulation.dt))
         grown = (FORCES, REPLAY_FRAMES, STROKE, *(grasp_file(g.name) for g in simulation.graspers))
         super().__init__(outputs.folder, every, grown)
         if outputs.resumption is not None:
@@ -68,64 +72,78 @@ class RunCheckpoints(Checkpoints):
 
     def _now(self) -> Checkpoint:
         """Return the run as it is."""
-        notes = self._run.outputs.checkpoint_notes(self.mark(), self._run.replay.mark())
-        return Checkpoint(CheckpointHead(*notes), self._run.simulation.save_state().to_bytes())
+        written = self._run.outputs.written() | {REPLAY_FRAMES: self._run.replay.mark()}
+        state = self._run.simulation.save_state().to_bytes()
+        return Checkpoint(self._plan, RunMark(self.mark(), written), state)
 
 
 def perform(
-    simulation: Simulation,
-    outputs: Outputs,
+    prepared: PreparedRun,
     *,
-    settings: dict[str, Any],
-    scene: Scene | None = None,
-    views: Sequence[ViewTable] = (),
-    seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
     controls: RunControls | None = None,
+    resumption: Resumption | None = None,
 ) -> Summary:
-    """Do the run, and write its files.
+    """Do a run, by its script or by a hand, and write its files.
 
     A run that ends early, by the user, the system or an error, leaves the files of the part that
-    was done, and its summary's `status` says what ended it.
+    was done, and its summary's `status` says what ended it. A script has a progress bar on a
+    terminal.
 
     Args:
-        simulation: At its start.
-        outputs: The folder of the files.
-        settings: Settings to keep in the summary.
-        scene: What `scene.toml` is to hold, if its body is in a table; None: no such file.
-        views: Cameras that the replay offers; it begins with the first.
-        seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
-        every_frame: Called after each frame.
-        controls: What a page asks of the run. If it has a hand, that leads blade and graspers; what
-            it does is written, as `stroke.csv` and a file for each grasper, and the run ends with a
-            rest after the hand has ended.
+        prepared: The run.
+        every_frame: Called after each frame; None: the run waits until the frame is due, where
+            there are controls.
+        controls: Requests of a page or a device. If they have a hand, that leads blade and
+            graspers; what it does is written, as `stroke.csv` and a file for each grasper, and the
+            run ends with a rest after the hand has ended.
+        resumption: Files of the run, if it continues from there.
 
     Raises:
         StateError: a run that goes on is made otherwise than it was.
         Interrupted: the user or the system ended the run.
-        RunError: the run failed, or a file could not be written. The other files are.
+        RunError: another run writes there, the run failed, or a file could not be written. The
+            other files are.
     """
-    plan = None if outputs.resumption is None else outputs.resumption.plan
-    if plan is not None:
-        settings = plan.settings
-    seconds = run_time(simulation, seconds)
+    simulation, settings = prepared.simulation, prepared.settings
     hand = None if controls is None else controls.hand
-    simulation.recording.keep_in(outputs.folder)
-    with outputs, StopSignals() as stop, outputs.replay_log() as log:
+    if resumption is not None and resumption.plan is not None:
+        settings = resumption.plan.settings
+    if hand is not None:
+        settings = settings | {"stroke": simulation.stroke.name}
+    if controls is not None:
+        controls.pace.go_on()
+        every_frame = every_frame or (lambda now: controls.pace.wait(now.dt))
+    seconds = _length_of(prepared, hand, resumption)
+    simulation.recording.keep_in(prepared.folder)
+    with (
+        progress(seconds, prepared.printing) if hand is None else nullcontext() as advance,
+        Outputs(
+            prepared.folder,
+            prepared.plotter,
+            simulation.recording.columns,
+            resumption,
+        ) as outputs,
+        StopSignals() as stop,
+        outputs.replay_log() as log,
+    ):
         replay = ReplayWriter(
             simulation.arm.model,
             title=simulation.title,
             frame=simulation.frame,
-            views=views,
+            views=prepared.scene.views,
             log=log,
         )
-        run = OpenRun(simulation, outputs, replay, settings, hand)
-        _begin(run, scene, None if hand is not None else seconds)
+        run = OpenRun(prepared, outputs, replay, settings, hand)
+        # Of a tissue elsewhere nobody says how it is held or solved.
+        scene = prepared.scene if prepared.is_here else None
+        plan = _begin(run, scene, None if hand is not None else seconds)
         simulation.pictures.append(into_replay(replay))
-        with RunCheckpoints(run) as checkpoints:
+        with RunCheckpoints(run, plan) as checkpoints:
             if controls is not None:
                 controls.history.begin(checkpoints, outputs, replay)
-            run.failure = _run_frames(run, seconds, every_frame, controls, stop, checkpoints)
+            calls = [each for each in (advance, every_frame) if each is not None]
+            run.failure = _run_frames(run, seconds, calls, controls, stop, checkpoints)
         stopped, stop.is_writing = stop.reason, True
         run.status = stopped or _status_of(run.failure, controls)
         summary = write_end(run)
@@ -169,14 +187,14 @@ def _raise_what_ended_it(
         raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
 
 
-def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> None:
+def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
     """Write what is known before the first frame, and keep space for what comes after the last.
 
     A run that goes on is put where it was first: what is refused leaves its folder as it is.
 
     Args:
         run: At its start.
-        scene: See `perform`.
+        scene: What `scene.toml` is to hold, if its body is in a table; None: no such file.
         seconds: How long the run is to last [s]; None: as long as the hand leads.
 
     Raises:
@@ -196,18 +214,20 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> None:
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
-    exports = [str(path.absolute()) for path in outputs.exports]
+    exports = [str(path.absolute()) for path in run.prepared.exports]
     read = {} if scene is None or hand is not None else _sums_of_recorded(scene, outputs)
-    outputs.begin_journal(RunPlan(simulation.dt, text, exports, run.settings), seconds, read)
+    plan = RunPlan(simulation.dt, text, exports, run.settings, seconds, read)
+    outputs.begin_journal(plan)
     if outputs.resumption is None:
         outputs.write_mesh(INITIAL, run.first)
         outputs.keep_reserve()
+    return plan
 
 
 def _run_frames(
     run: OpenRun,
     seconds: float,
-    every_frame: Callable[[Simulation], None] | None,
+    every_frame: Sequence[Callable[[Simulation], None]],
     controls: RunControls | None,
     stop: StopSignals,
     checkpoints: RunCheckpoints,
@@ -217,8 +237,8 @@ def _run_frames(
     Args:
         run: At its start, or where it goes on.
         seconds: How long to simulate [s].
-        every_frame: See `perform`, as the next.
-        controls: Requests of a page.
+        every_frame: Functions that are called after each frame.
+        controls: See `perform`.
         stop: The signals.
         checkpoints: Checkpoints of the run.
     """
@@ -243,8 +263,8 @@ def _run_frames(
             write_rows()
         if is_due:
             checkpoints.write_now()
-        if every_frame is not None:
-            every_frame(now)
+        for call in every_frame:
+            call(now)
         obey()
         if hand is not None:
             return stop.reason is not None or _has_rested(now, hand)
@@ -313,6 +333,17 @@ def _sums_of_recorded(scene: Scene, outputs: Outputs) -> dict[str, FileSum]:
         OSError: one cannot be read.
     """
     return {relative_path(path, outputs.folder): sum_of(path) for path in scene.recorded_files}
+
+
+def _length_of(
+    prepared: PreparedRun, hand: Teleoperation | None, resumption: Resumption | None
+) -> float:
+    """Return how long to simulate [s], at most."""
+    if hand is not None:
+        return LONGEST_RUN + REST_AFTER_STROKE
+    if resumption is not None and resumption.seconds is not None:
+        return resumption.seconds
+    return run_time(prepared.simulation, prepared.scene.seconds)
 
 
 def run_time(simulation: Simulation, seconds: float | None) -> float:

@@ -12,9 +12,19 @@ from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_outcome import COMPLETE, RunOutcome, outcome_of
 from scalpel_sim.output.run_warnings import RunWarning, warnings_of
 from scalpel_sim.output.summary import Summary, summarise
-from scalpel_sim.runs.file_names import FINAL, FORCES, PLOT, REPLAY, SUMMARY
+from scalpel_sim.runs.file_names import (
+    FINAL,
+    FORCES,
+    PLOT,
+    REPLAY,
+    STROKE,
+    SUMMARY,
+    grasp_file,
+)
+from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.simulation import Simulation
+from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
+from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.pictures import add_to
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import Snapshot
@@ -65,7 +75,7 @@ class Attempts:
 class OpenRun:
     """A run between its first and its last file."""
 
-    simulation: Simulation
+    prepared: PreparedRun
     outputs: Outputs
     replay: ReplayWriter
     settings: dict[str, Any]
@@ -74,6 +84,7 @@ class OpenRun:
     """Teleoperation of the blade; None: a script leads it."""
 
     def __post_init__(self) -> None:
+        self.simulation = self.prepared.simulation
         link = self.simulation.link  # later it may be lost
         self.body: TissueDescription = link.describe()
         self.title = self.simulation.title
@@ -120,7 +131,7 @@ def write_end(run: OpenRun) -> Summary:
         add_to(run.replay, simulation)
     with attempts.of(REPLAY):
         outputs.write_replay(run.replay)
-    for path in outputs.exports:
+    for path in run.prepared.exports:
         with attempts.of(str(path)):
             export_surface(simulation.link.surface(), path)
     with attempts.of(PLOT):
@@ -138,10 +149,10 @@ def write_driven(outputs: Outputs, hand: Teleoperation) -> None:
     grasps = [(grasper.name, grasper.take_rows()) for grasper in hand.graspers]
     attempts = Attempts()
     with attempts.of(_LED):
-        outputs.write_stroke(rows)
+        outputs.write_driven(STROKE, LED_COLUMNS, rows)
     for name, done in grasps:
         with attempts.of(_LED):
-            outputs.write_grasp(name, done)
+            outputs.write_driven(grasp_file(name), GRASP_COLUMNS, done)
     if attempts.errors:
         raise attempts.errors[0]
 

@@ -14,8 +14,8 @@ from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.preparation.tissue import check_scene, make_tissue, pulled_apart
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import ENERGY_PLOT, RUN_FILES, SCENE
+from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import REST_AFTER_STROKE, perform, run_time
-from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import DEFAULT_SCENE, scene_called
 from scalpel_sim.scene.scene import GEL, changed
 from scalpel_sim.scene.served import scene_of
@@ -199,9 +199,11 @@ def test_an_arm_that_loses_its_tissue_in_the_middle_of_a_cut_is_released():
 
 def perform_in(folder, simulation: Simulation, seconds: float = 0.3):
     with Plotter() as plotter:
-        return perform(
-            simulation, Outputs(folder, plotter), settings={"stroke": "straight"}, seconds=seconds
+        scene = changed(GRID2, seconds=seconds)
+        prepared = PreparedRun(
+            simulation, scene, folder, {"stroke": "straight"}, plotter, is_here=False
         )
+        return perform(prepared)
 
 
 def test_a_run_that_loses_its_tissue_keeps_all_files_but_the_final_mesh(tmp_path):

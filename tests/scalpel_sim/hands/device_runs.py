@@ -80,7 +80,7 @@ class WatchedRun:
 def watched_run(folder, **options):
     """Yield a run of a small body at its start, at which a device can connect."""
     scene = changed(GRID2, relaxation="verlet")
-    prepared = PreparedRun(prepare(scene, is_led=True), scene, folder, {}, 0.0)
+    prepared = PreparedRun(prepare(scene, is_led=True), scene, folder, {}, plotter=None)
     with device_run(prepared, DeviceOptions(listen="127.0.0.1:0", **options)) as led:
         yield WatchedRun(prepared, led)
 

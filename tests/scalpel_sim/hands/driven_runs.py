@@ -10,8 +10,9 @@ from scalpel_sim.hands.commands import Engage, Move, Turn
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import perform
-from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.scene.scene import changed
 
 GRID2 = SCENES["grid2"]
 
@@ -48,10 +49,14 @@ def controls_of(simulation: Simulation, hand: LiveHand | None) -> RunControls:
     return RunControls(Pace(), History(simulation), hand)
 
 
-def done(simulation: Simulation, folder: Path, **others):
-    """Do a run that writes its files to a folder."""
+def done(simulation: Simulation, folder: Path, scene=None, **others):
+    """Do a run that writes its files to a folder; `scene.toml` is one of them if it is given."""
     with Plotter() as plotter:
-        perform(simulation, Outputs(folder, plotter), settings={}, **others)
+        known = scene or changed(GRID2, seconds=None)
+        perform(
+            PreparedRun(simulation, known, folder, {}, plotter, is_here=scene is not None),
+            **others,
+        )
 
 
 def poses(hand, n, first=0):

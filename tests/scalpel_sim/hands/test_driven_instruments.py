@@ -14,11 +14,11 @@ from scalpel_sim.hands.limited_pose import MOST_SPEED
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.file_names import FINAL, SCENE, STROKE, grasp_file
-from scalpel_sim.runs.run import REST_AFTER_STROKE, perform
+from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS, grasp_from_csv
-from tests.scalpel_sim.hands.driven_runs import PERIOD, Clock, controls_of, led, move, turn
+from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
+from tests.scalpel_sim.hands.driven_runs import PERIOD, Clock, controls_of, done, led, move, turn
 from tests.support.run_files import assert_same_run, untimed
 
 SHEET = read_scene(Path(__file__).parent / "sheet.toml")
@@ -74,12 +74,6 @@ def doing(script, hand):
     return command
 
 
-def performed(simulation, folder, **others):
-    with Plotter() as plotter:
-        outputs = Outputs(folder, plotter, simulation.recording.columns)
-        perform(simulation, outputs, settings={}, **others)
-
-
 @pytest.fixture(scope="module")
 def lifted(tmp_path_factory):
     """A run in which a hand lifts the sheet and cuts it, the hand, and the folder of its files."""
@@ -88,7 +82,7 @@ def lifted(tmp_path_factory):
     command = doing(LIFT_AND_CUT, hand)
     command(simulation)
     controls = controls_of(simulation, hand)
-    performed(simulation, folder, scene=SHEET, seconds=10.0, every_frame=command, controls=controls)
+    done(simulation, folder, SHEET, every_frame=command, controls=controls)
     return simulation, hand, folder
 
 
@@ -112,7 +106,7 @@ def test_a_hand_grasps_the_edge_lifts_it_cuts_under_tension_and_lets_go(lifted):
 def test_a_run_of_the_scene_that_it_wrote_repeats_it_to_the_bit(lifted, tmp_path):
     simulation, _, folder = lifted
     repeated = prepare(read_scene(folder / SCENE))
-    performed(repeated, tmp_path)
+    done(repeated, tmp_path)
     assert len(repeated.recording) == len(simulation.recording)
     assert_same_run(folder, tmp_path)
 
@@ -242,12 +236,12 @@ def test_an_undo_takes_what_a_grasper_did_off_its_record(tmp_path):
     command = doing([*undone, *kept], controls)
     command(simulation)
     folder, again = tmp_path / "led", tmp_path / "again"
-    performed(simulation, folder, scene=SHEET, seconds=10.0, every_frame=command, controls=controls)
+    done(simulation, folder, SHEET, every_frame=command, controls=controls)
     at = hand.graspers[0].pose.middle
     assert at == pytest.approx(SHEET.graspers[0].motion[0].at, abs=ROUNDING)
     assert len((folder / grasp_file("left")).read_text().splitlines()) < 10, "it rests all the time"
     repeated = prepare(read_scene(folder / SCENE))
-    performed(repeated, again)
+    done(repeated, again)
     assert (folder / FINAL).read_bytes() == (again / FINAL).read_bytes()
 
 

@@ -116,7 +116,7 @@ def test_what_was_undone_is_in_no_file_and_a_run_of_the_record_has_the_same_bits
 
     controls.commands += script.pop(0)[1]
     driven_folder, again = tmp_path / "led", tmp_path / "again"
-    done(simulation, driven_folder, seconds=10.0, every_frame=every_frame, controls=controls)
+    done(simulation, driven_folder, every_frame=every_frame, controls=controls)
     repeated = prepare(changed(SCENE, stroke=str(driven_folder / STROKE)))
     done(repeated, again)
     assert_same_run(driven_folder, again)

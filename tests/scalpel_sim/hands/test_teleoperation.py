@@ -159,7 +159,6 @@ def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
     done(
         simulation,
         tmp_path / "led",
-        seconds=10.0,
         every_frame=every_frame,
         controls=controls_of(simulation, hand),
     )
@@ -179,7 +178,7 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
     hand.finish(simulation.time)
     with Plotter() as plotter:
         outputs = Outputs(tmp_path, plotter)
-        outputs.write_stroke(hand.blade.take_rows())
+        outputs.write_driven(STROKE, LED_COLUMNS, hand.blade.take_rows())
         outputs.close()
 
     recorded = StrokeTable(kind="recorded", file=str(tmp_path / STROKE))

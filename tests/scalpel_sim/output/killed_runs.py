@@ -21,10 +21,9 @@ from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.checkpoints import Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
 from scalpel_sim.runs.options import ClientOptions, PrintOptions, RunOutputOptions
-from scalpel_sim.runs.prepared_run import perform_script
+from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.resumption import resumption_of
 from scalpel_sim.runs.run import perform
-from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import read_scene
 from tests.scalpel_sim.hands.driven_runs import controls_of, through_the_body
 from tests.support.run_files import untimed
@@ -62,15 +61,10 @@ def at(n_frames):
 
 def perform_in(folder, scene, simulation=None, resumption=None, **others):
     """Do a run in a folder."""
-    simulation = prepare(scene) if simulation is None else simulation
+    simulation, settings = simulation or prepare(scene), {"scene": scene.name}
     with Plotter() as plotter:
-        columns = simulation.recording.columns
-        outputs = Outputs(folder, plotter, columns, checkpoint_seconds=EVERY, resumption=resumption)
-        settings = {"scene": scene.name}
-        seconds = scene.seconds
-        return perform(
-            simulation, outputs, scene=scene, settings=settings, seconds=seconds, **others
-        )
+        prepared = PreparedRun(simulation, scene, folder, settings, plotter, EVERY)
+        return perform(prepared, resumption=resumption, **others)
 
 
 def kill_in(folder, scene, n_frames, **others):
@@ -133,8 +127,8 @@ def run_in(folder, n_frames=None, **arm):
     """Do a run as the command does, which is killed after so many frames, if after any."""
     output = replace(AGAIN.output, out=folder)
     asked = AGAIN._replace(arm=ArmOptions(seconds=0.25, **arm), output=output)
-    with Plotter() as plotter, prepared_run("grid2", asked, audits=True) as prepared:
-        perform_script(prepared, plotter, at(n_frames))
+    with prepared_run("grid2", asked, audits=True) as prepared:
+        perform(prepared, every_frame=at(n_frames))
 
 
 def killed_in(folder):
@@ -155,14 +149,13 @@ def resuming() -> Iterator[Callable]:
     """Yield a function that goes on with the run in a folder, as the command does."""
     loading = deque([Plotter()])  # one ahead: loading takes longer than these runs
 
-    def resume(folder):
+    def loaded():
         loading.append(Plotter())
-        with loading.popleft() as plotter:
-            return perform_resumed(folder, AGAIN, plotter)
+        return loading.popleft()
 
-    try:
-        yield resume
-    finally:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("scalpel_sim.cli.run_setup.Plotter", loaded)
+        yield lambda folder: perform_resumed(folder, AGAIN)
         loading.pop().close()
 
 
@@ -174,7 +167,7 @@ def copied(source, target):
 def checkpoints(folder):
     """Return the paths of the checkpoints, the last one first."""
     paths = [folder / name for name in CHECKPOINT_FILES]
-    return sorted(paths, key=lambda path: -read_checkpoint(path).head.mark.n_frames)
+    return sorted(paths, key=lambda path: -read_checkpoint(path).mark.n_frames)
 
 
 def change(path, damage):

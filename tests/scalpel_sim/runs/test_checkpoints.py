@@ -5,7 +5,7 @@ import resource
 import pytest
 
 from scalpel_sim.recording.growing_file import FileSum
-from scalpel_sim.runs.checkpoints import Checkpoint, CheckpointHead, Checkpoints, read_checkpoint
+from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
 from scalpel_sim.runs.journal import RunMark, RunPlan
 from tissue import StateError
@@ -13,9 +13,9 @@ from tissue import StateError
 
 def checkpoint(n_frames, n_bytes=1000):
     """Return a checkpoint whose state is so long."""
-    plan = RunPlan(1e-3, "name = 'slab'", ["/a.stl"], {"young": 1e4})
-    mark = RunMark(n_frames, 1.5, {"forces.csv": FileSum(10 * n_frames, 7)})
-    return Checkpoint(CheckpointHead(plan, mark), bytes([n_frames % 256]) * n_bytes)
+    plan = RunPlan(1e-3, "name = 'slab'", ["/a.stl"], {"young": 1e4}, 1.5)
+    mark = RunMark(n_frames, {"forces.csv": FileSum(10 * n_frames, 7)})
+    return Checkpoint(plan, mark, bytes([n_frames % 256]) * n_bytes)
 
 
 def written(folder, *n_frames, every=100):
@@ -30,7 +30,7 @@ def written(folder, *n_frames, every=100):
 def frames_in(folder):
     """Return the frames of the checkpoints in a folder, the last one first."""
     with Checkpoints(folder) as checkpoints:
-        return [each.head.mark.n_frames for each in checkpoints.read()]
+        return [each.mark.n_frames for each in checkpoints.read()]
 
 
 def test_a_checkpoint_is_read_as_it_was_written():
