@@ -23,7 +23,7 @@ from benchmarks.engine import (
     held_nodes,
 )
 from benchmarks.peers.adapters import PeerBody, write_body
-from scalpel_sim.recording.row_store import unnamed_file
+from scalpel_sim.recording.recording import unnamed_file
 from tissue import FloatArray, TetrahedralMesh
 
 _ADAPTERS = Path(__file__).with_name("adapters.py")

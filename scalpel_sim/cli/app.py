@@ -99,8 +99,7 @@ def _run(
             you choose another or the tissue stiffens.
     """
     with log_to_stderr(printing):
-        from scalpel_sim.cli.resumed_run import perform_resumed
-        from scalpel_sim.cli.run_setup import RunOptions, prepared_run
+        from scalpel_sim.cli.run_setup import RunOptions, perform_resumed, prepared_run
         from scalpel_sim.runs.device_run import check_device_options, device_run, perform_device
         from scalpel_sim.runs.run import perform
         from scalpel_sim.scene.case import is_case

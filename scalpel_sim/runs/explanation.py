@@ -15,7 +15,7 @@ from bridge import InProcessLink
 from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.preparation.tissue import make_tissue
-from scalpel_sim.recording.force_parts import ForceParts
+from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.recording.growing_file import FileSum
 from scalpel_sim.recording.recording import Recording, read_forces
 from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints

@@ -13,7 +13,7 @@ from scalpel_sim.output.run_outcome import COMPLETE
 from scalpel_sim.recording.columns import WALL_TIMES
 from scalpel_sim.recording.growing_file import FileSum, sum_of, sums_that_hold
 from scalpel_sim.recording.recording import Recording, read_forces
-from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints, RunMark, RunPlan, read_journal
 from scalpel_sim.runs.file_names import (
     FORCES,
     INITIAL,
@@ -23,7 +23,6 @@ from scalpel_sim.runs.file_names import (
     SCENE,
     SUMMARY,
 )
-from scalpel_sim.runs.journal import RunMark, RunPlan, read_journal
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state import SimulationState
 from tissue import FloatArray, StateError

@@ -13,10 +13,9 @@ from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.run_outcome import COMPLETE
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.growing_file import FileSum, sum_of
-from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints
+from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints, RunMark, RunPlan
 from scalpel_sim.runs.console import progress
 from scalpel_sim.runs.file_names import FORCES, INITIAL, REPLAY_FRAMES, SCENE, STROKE, grasp_file
-from scalpel_sim.runs.journal import RunMark, RunPlan
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.resumption import RepeatedFrames, Resumption
 from scalpel_sim.runs.run_end import OpenRun, write_driven, write_end

@@ -16,6 +16,7 @@ from scalpel_sim.output.summary import Summary, summary_json
 from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.growing_file import FileSum, GrowingFile
 from scalpel_sim.recording.recording import Recording, lines_of_rows
+from scalpel_sim.runs.checkpoints import RunMark, RunPlan, line_of
 from scalpel_sim.runs.file_names import (
     ENERGY_PLOT,
     FORCES,
@@ -29,7 +30,6 @@ from scalpel_sim.runs.file_names import (
     SCENE,
     SUMMARY,
 )
-from scalpel_sim.runs.journal import RunMark, RunPlan, line_of
 from scalpel_sim.runs.resumption import Resumption
 from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter

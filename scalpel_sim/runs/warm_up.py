@@ -23,8 +23,7 @@ from bridge import TissueFrame, compiled_arithmetic
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
-from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, frame_row
-from scalpel_sim.recording.force_parts import force_parts
+from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, force_parts, frame_row
 from scalpel_sim.runs.stop_signals import SignalInterrupt, StopSignals
 from scalpel_sim.scene.read import PARENCHYMA, PHANTOM
 from scalpel_sim.scene.scene import Scene

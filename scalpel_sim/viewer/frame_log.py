@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from scalpel_sim.recording.growing_file import FileSum
-from scalpel_sim.recording.row_store import unnamed_file
+from scalpel_sim.recording.recording import unnamed_file
 from scalpel_sim.viewer.messages import SceneState
 
 _HEAD = struct.Struct("<dqq")

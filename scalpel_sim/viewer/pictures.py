@@ -8,7 +8,7 @@ import numpy as np
 
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.teleoperation import Teleoperation
-from scalpel_sim.recording.force_parts import force_parts
+from scalpel_sim.recording.columns import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from scalpel_sim.recording.force_parts import ForceParts
+from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.recording.recording import TERMS
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.primitives import TriangleMesh

@@ -12,8 +12,7 @@ import pytest
 
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.cli.options import ArmOptions, TissueOptions
-from scalpel_sim.cli.resumed_run import perform_resumed
-from scalpel_sim.cli.run_setup import RunOptions, prepared_run
+from scalpel_sim.cli.run_setup import RunOptions, perform_resumed, prepared_run
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.recording.columns import shared_columns

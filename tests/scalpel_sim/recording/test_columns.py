@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from bridge import TissueFrame
-from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, frame_row, shared_columns
-from scalpel_sim.recording.force_parts import force_parts
+from scalpel_sim.recording.columns import (
+    COLUMNS,
+    FrameData,
+    WallTimes,
+    force_parts,
+    frame_row,
+    shared_columns,
+)
 from tissue import BladeSegment, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

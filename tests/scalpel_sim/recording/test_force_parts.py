@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
-from scalpel_sim.recording.columns import shared_columns
-from scalpel_sim.recording.force_parts import EDGE_COSINE, force_parts
+from scalpel_sim.recording.columns import EDGE_COSINE, force_parts, shared_columns
 from scalpel_sim.scene.scene import changed
 from tissue import RigidContacts
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.errors import RunError
-from scalpel_sim.recording.recording import Recording
-from scalpel_sim.recording.row_store import ROWS_IN_MEMORY, ROWS_PER_WRITE, RowStore
+from scalpel_sim.recording.recording import ROWS_IN_MEMORY, ROWS_PER_WRITE, Recording, RowStore
 
 N_COLUMNS = 3
 N_ROWS = ROWS_IN_MEMORY + 5 * ROWS_PER_WRITE + 7

@@ -5,9 +5,8 @@ import resource
 import pytest
 
 from scalpel_sim.recording.growing_file import FileSum
-from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints, read_checkpoint
+from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints, RunMark, RunPlan, read_checkpoint
 from scalpel_sim.runs.file_names import CHECKPOINT_FILES
-from scalpel_sim.runs.journal import RunMark, RunPlan
 from tissue import StateError
 
 

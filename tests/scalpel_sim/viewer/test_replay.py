@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.errors import RunError
-from scalpel_sim.recording.force_parts import ForceParts
+from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import page
 from scalpel_sim.viewer import replay as replay_module
