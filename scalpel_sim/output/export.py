@@ -11,7 +11,7 @@ turned so that y points up, as the format demands.
 Pieces are numbered from 1, the largest at rest first, as in `summary.json`.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -47,9 +47,8 @@ def export_surface(surface: Surface, path: Path) -> None:
         UsageError: the ending is none of `ENDINGS`.
         RunError: the file cannot be written.
     """
-    write = _WRITERS.get(path.suffix.lower())
-    if write is None:
-        raise _unknown_ending(path)
+    _check_suffix(path, ENDINGS, "--export")
+    write = _WRITERS[path.suffix.lower()]
     with writing(path, "another --export"), whole_file(path) as unfinished:
         unfinished.write_bytes(write(surface))
 
@@ -62,10 +61,8 @@ def check_exports(paths: Iterable[Path]) -> None:
         RunError: the system refuses to write there.
     """
     for path in paths:
-        ending = path.suffix.lower()
-        if ending not in _WRITERS:
-            raise _unknown_ending(path)
-        check_file(path, ending, "--export")
+        _check_suffix(path, ENDINGS, "--export")
+        check_file(path, path.suffix.lower(), "--export")
 
 
 def check_file(path: Path, suffix: str, option: str) -> None:
@@ -80,8 +77,7 @@ def check_file(path: Path, suffix: str, option: str) -> None:
         UsageError: another suffix, a folder, or a file in a folder that does not exist.
         RunError: the system refuses.
     """
-    if path.suffix.lower() != suffix:
-        raise UsageError(f"{option} is {path}; its name must end in {suffix}")
+    _check_suffix(path, [suffix], option)
     if path.is_dir() or not path.parent.is_dir():
         reason = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
         raise UsageError(f"{option} is {path}, and {reason}; choose another file")
@@ -233,10 +229,12 @@ def _exported(mesh: "Trimesh | Scene", kind: str) -> bytes:
     return exported
 
 
-def _unknown_ending(path: Path) -> UsageError:
-    """Return the error for a file name whose ending is no format."""
-    *others, last = ENDINGS
-    return UsageError(f"--export is {path}; its name must end in {', '.join(others)} or {last}")
+def _check_suffix(path: Path, suffixes: Sequence[str], option: str) -> None:
+    """Refuse a file whose name ends in another suffix."""
+    if path.suffix.lower() not in suffixes:
+        *others, last = suffixes
+        known = f"{', '.join(others)} or {last}" if others else last
+        raise UsageError(f"{option} is {path}; its name must end in {known}")
 
 
 _WRITERS: dict[str, Callable[[Surface], bytes]] = {

@@ -1,9 +1,10 @@
 """The end of a run: all that was done goes to its folder, whatever ended it."""
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import RunError, one_line
@@ -46,29 +47,21 @@ class Attempts:
         self.unwritten: list[str] = []
         """Names of what could not be written."""
         self._failure = failure
-        self._name = ""
 
-    def of(self, name: str) -> Self:
-        """Return the attempt to write what has this name."""
-        self._name = name
-        return self
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> bool:
-        if not isinstance(error, Exception):
-            return False
-        self.errors.append(error)
-        self.unwritten.append(self._name)
-        if not (isinstance(error, LinkError) and isinstance(self._failure, LinkError)):
-            _log.warning("%s", _about(self._name, error))
-        return True
+    @contextmanager
+    def of(self, name: str) -> Iterator[None]:
+        """Try to write what has this name."""
+        try:
+            yield
+        except Exception as error:
+            self.errors.append(error)
+            self.unwritten.append(name)
+            if not (isinstance(error, LinkError) and isinstance(self._failure, LinkError)):
+                # A RunError names its file.
+                is_named = isinstance(error, RunError)
+                _log.warning(
+                    "%s", error if is_named else f"{name}: cannot be written ({one_line(error)})"
+                )
 
 
 @dataclass
@@ -167,10 +160,3 @@ def _outcome(run: OpenRun) -> RunOutcome:
         with run.attempts.of("the quality of the cut"):
             report = run.simulation.link.cut_report()
     return outcome_of(run.simulation, run.settings, run.body, run.first, last, report, run.status)
-
-
-def _about(name: str, error: Exception) -> str:
-    """Return the line about a file that could not be written."""
-    if isinstance(error, RunError):  # it names its file
-        return str(error)
-    return f"{name}: cannot be written ({one_line(error)})"

@@ -1,5 +1,6 @@
 """Finds what is wrong with the content of a TOML file, and where."""
 
+import re
 import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, get_args, get_origin
@@ -17,6 +18,9 @@ REPLACED: dict[tuple[str, ...], str] = {
 
 _Table = type[msgspec.Struct]
 
+_STEP = re.compile(r"\.(\w+)|\[(\d+)\]")
+"""A part of the path of an error: a key, or the number of a row."""
+
 
 class Problem(NamedTuple):
     """A key or a value that is wrong."""
@@ -31,37 +35,56 @@ def problem_of(content: Mapping[str, Any], table: _Table) -> Problem | None:
     """Return the first problem of the content of a file, for people; None if there is none.
 
     Args:
-        content: What the file has.
-        table: What it should be.
+        content: Content of the file.
+        table: Its schema.
     """
-    return _problem(content, table, "", (), table)
+    try:
+        msgspec.convert(content, table)
+    except msgspec.ValidationError as error:
+        what, _, path = str(error).partition(" - at `$")
+        return _problem_at(_STEP.findall(path), what, content, table)
+    return None
 
 
-def _problem(
-    content: Mapping[str, Any], table: _Table, where: str, at: tuple[str, ...], whole: _Table
-) -> Problem | None:
-    """Return the first problem of the content of a table.
+def _problem_at(
+    steps: Sequence[tuple[str, str]], what: str, content: Mapping[str, Any], whole: _Table
+) -> Problem:
+    """Return the problem of a file for people.
 
     Args:
-        content: What the file has.
-        table: What it should be.
-        where: Name of the table, as a file writes it: "[body]"; empty for the whole file.
-        at: Parts of its key.
-        whole: What the whole file should be.
+        steps: Path to the problem: keys, and numbers of rows from 0 on.
+        what: Problem as `msgspec` names it.
+        content: Content of the file.
+        whole: Its schema.
     """
+    table, where, value, at = whole, "", content, tuple[str, ...]()
+    rest = list(steps)
+    while rest:
+        key, _ = rest.pop(0)
+        kind, value, at = kinds_of(table)[key], value[key], (*at, key)
+        row, inner = row_table_of(kind), table_of(kind)
+        if row is not None:
+            i = int(rest.pop(0)[1]) if rest else 0
+            if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
+                what = f"tables: [[{key}]], then a key a line"
+                return Problem(f"{key} is {as_toml(value)}; it must be {what}", at)
+            if not value:
+                return Problem(f"the file has no [[{key}]]", at)
+            table, where, at = row, f"{where} [[{key}]] number {i + 1}".strip(), (*at, str(i))
+            value = value[i]
+        elif inner is not None:
+            if not isinstance(value, Mapping):
+                what = f"a table: [{key}], then a key a line"
+                return Problem(f"{key} is {as_toml(value)}; it must be {what}", at)
+            table, where = inner, f"[{key}]"
+        else:
+            text = f"{where} {key} is {as_toml(value)}; it must be {_allowed(kind)}"
+            return Problem(text.strip(), at)
     kinds = kinds_of(table)
-    for key, value in content.items():
-        if key not in kinds:
-            return Problem(_unknown_key(key, value, kinds, where, at, whole), (*at, key))
-    for field in msgspec.structs.fields(table):
-        if field.required and field.encode_name not in content:
-            missing = _as_header(field.encode_name, field.type)
-            return Problem(f"{where or 'the file'} has no {missing}", at)
-    for key, value in content.items():
-        problem = _problem_of_value(key, value, kinds[key], where, (*at, key), whole)
-        if problem is not None:
-            return problem
-    return None
+    (name,) = re.findall("`(.*)`", what)
+    if name in kinds:
+        return Problem(f"{where or 'the file'} has no {_as_header(name, kinds[name])}", at)
+    return Problem(_unknown_key(name, value[name], kinds, where, at, whole), (*at, name))
 
 
 def check_keys(table: msgspec.Struct, where: str, kind_key: str, kinds: Mapping[str, Kind]) -> None:
@@ -153,36 +176,6 @@ def _unknown_key(
     if where:
         return str(unknown(f"key of {where}", key, kinds))
     return str(unknown("table" if isinstance(value, Mapping) else "key", key, kinds))
-
-
-def _problem_of_value(
-    key: str, value: object, kind: Any, where: str, at: tuple[str, ...], whole: _Table
-) -> Problem | None:
-    """Return what is wrong with a value of that type."""
-    row, inner = row_table_of(kind), table_of(kind)
-    if row is not None:
-        if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
-            what = f"tables: [[{key}]], then a key a line"
-            return Problem(f"{key} is {as_toml(value)}; it must be {what}", at)
-        if not value:
-            return Problem(f"the file has no [[{key}]]", at)
-        for i, each in enumerate(value):
-            name = f"{where} [[{key}]] number {i + 1}".strip()
-            problem = _problem(each, row, name, (*at, str(i)), whole)
-            if problem is not None:
-                return problem
-        return None
-    if inner is not None:
-        if not isinstance(value, Mapping):
-            what = f"a table: [{key}], then a key a line"
-            return Problem(f"{key} is {as_toml(value)}; it must be {what}", at)
-        return _problem(value, inner, f"[{key}]", at, whole)
-    try:
-        msgspec.convert(value, kind)
-    except msgspec.ValidationError:
-        text = f"{where} {key} is {as_toml(value)}; it must be {_allowed(kind)}"
-        return Problem(text.strip(), at)
-    return None
 
 
 def _as_header(name: str, kind: Any) -> str:
