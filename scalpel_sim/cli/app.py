@@ -113,10 +113,7 @@ def _run(
                     "--resume goes on with the run in its folder; omit the scene and --hand"
                 )
             check_device_options(device, is_led=False)
-            summary, resumed = perform_resumed(output.resume, options)
-            print_report(summary, resumed.folder, output.export, printing)
-            expect_no_warnings(summary, output)
-            return
+            return expect_no_warnings(perform_resumed(output.resume, options), output)
         check_device_options(device, is_led=is_led)
         if scene is not None and is_toml_file(scene) and is_case(Path(scene)):
             expect_no_options(
@@ -135,7 +132,7 @@ def _run(
                     summary = perform_device(prepared, led)
             else:
                 summary = perform(prepared)
-            print_report(summary, prepared.folder, output.export, printing)
+            print_report(summary, prepared)
         expect_no_warnings(summary, output)
 
 

@@ -23,6 +23,7 @@ from scalpel_sim.output.summary import Summary
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.preparation.tissue import check_scene, make_tissue
 from scalpel_sim.runs.checkpoints import CHECKPOINT_SECONDS
+from scalpel_sim.runs.console import print_report
 from scalpel_sim.runs.file_names import SCENE
 from scalpel_sim.runs.options import SERVER_PATIENCE, ClientOptions, OutputOptions, PrintOptions
 from scalpel_sim.runs.prepared_run import PreparedRun, load_kernels
@@ -182,8 +183,8 @@ def _tissue_elsewhere(
     return link, scene, settings | {"connect": address}
 
 
-def perform_resumed(folder: Path, options: RunOptions) -> tuple[Summary, PreparedRun]:
-    """Go on with a run, and return its summary and what it was.
+def perform_resumed(folder: Path, options: RunOptions) -> Summary:
+    """Go on with a run; print and return its summary.
 
     A run that a hand led goes on with what the hand did until it was killed, and then rests.
 
@@ -214,7 +215,9 @@ def perform_resumed(folder: Path, options: RunOptions) -> tuple[Summary, Prepare
         exports = tuple(map(Path, resumption.plan.exports))
     options = options._replace(output=replace(options.output, out=folder, export=exports))
     with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
-        return perform(prepared, resumption=resumption), prepared
+        summary = perform(prepared, resumption=resumption)
+        print_report(summary, prepared)
+        return summary
 
 
 def _end_records(folder: Path, resumption: Resumption) -> None:

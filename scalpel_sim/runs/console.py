@@ -4,9 +4,8 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scalpel_sim.errors import Interrupted, RunError, WarnedError
@@ -14,7 +13,10 @@ from scalpel_sim.runs.options import PrintOptions, RunOutputOptions
 from scalpel_sim.runs.stop_signals import StopSignals
 
 if TYPE_CHECKING:  # an error of use should be printed without waiting for a compiler
+    from rich.progress import Progress, ProgressColumn
+
     from scalpel_sim.output.summary import Summary
+    from scalpel_sim.runs.prepared_run import PreparedRun
     from scalpel_sim.simulation import Simulation
 
 SECONDS_PER_PROGRESS = 0.1
@@ -65,8 +67,7 @@ def progress(seconds: float, options: PrintOptions) -> Iterator[Callable[["Simul
     if options.quiet or not sys.stderr.isatty():
         yield lambda simulation: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 
     columns = (
         TextColumn("{task.description}"),
@@ -75,10 +76,7 @@ def progress(seconds: float, options: PrintOptions) -> Iterator[Callable[["Simul
         TextColumn("{task.fields[force]:.2f} N"),
         TimeRemainingColumn(),
     )
-    # Drawn between two frames: a thread that draws would make frames wait.
-    with Progress(
-        *columns, console=Console(stderr=True), transient=True, auto_refresh=False
-    ) as bar:
+    with _bar(*columns) as bar:
         task = bar.add_task("cutting", total=seconds, force=0.0)
         due = time.monotonic()
 
@@ -102,14 +100,10 @@ def compiling(options: PrintOptions) -> Iterator[Callable[[int, int], None]]:
     if options.quiet:
         yield lambda done, total: None
     elif sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-        from rich.progress import TimeElapsedColumn as Elapsed
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Elapsed())
-        with Progress(
-            *columns, console=Console(stderr=True), transient=True, auto_refresh=False
-        ) as bar:
+        description, n_of_all = TextColumn("{task.description}"), MofNCompleteColumn()
+        with _bar(description, BarColumn(), n_of_all, TimeElapsedColumn()) as bar:
             task = bar.add_task("compiling kernels, first run only", total=None, visible=False)
             yield lambda done, total: bar.update(
                 task, completed=done, total=total, visible=True, refresh=True
@@ -126,10 +120,20 @@ def compiling(options: PrintOptions) -> Iterator[Callable[[int, int], None]]:
         yield print_line
 
 
-def print_report(
-    summary: "Summary", folder: Path, exports: Sequence[Path], options: PrintOptions
-) -> None:
+def _bar(*columns: "ProgressColumn") -> "Progress":
+    """Return a progress bar on standard error, which is drawn where it is updated.
+
+    A thread that draws would make frames wait.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    return Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
+
+
+def print_report(summary: "Summary", prepared: "PreparedRun") -> None:
     """Print the summary of a run, as a table or as JSON, and the names of its files."""
+    folder, options = prepared.folder, prepared.printing
     if options.json:
         from scalpel_sim.output.summary import summary_json
 
@@ -142,8 +146,8 @@ def print_report(
         print_summary(summary, Console())
         names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
         print(f"files in {folder}: {', '.join(names)}")
-        if exports:
-            print(f"exported: {', '.join(map(str, exports))}")
+        if prepared.exports:
+            print(f"exported: {', '.join(map(str, prepared.exports))}")
 
 
 def expect_no_warnings(summary: "Summary", options: RunOutputOptions) -> None:

@@ -95,8 +95,7 @@ class LiveSession:
             summary = self._done(run)
             run.show()
             if summary is not None:
-                done = run.prepared
-                print_report(summary, done.folder, done.exports, done.printing)
+                print_report(summary, run.prepared)
             run = self._after(run, summary is not None)
 
     def _begun(self, asked: Begin) -> _LiveRun:

@@ -248,7 +248,11 @@ class RepeatedFrames:
         if then is None:
             return
         now = recording.since(len(recording) - 1)[0]
-        differs = [i for i in self._kept if not _is_same(now[i], then[i])]
+        # Zeros are compared by their sign, too.
+        same = (now == then) & (np.signbit(now) == np.signbit(then)) | np.isnan(now) & np.isnan(
+            then
+        )
+        differs = [i for i in self._kept if not same[i]]
         if differs:
             name = self._columns[differs[0]]
             raise RunError(
@@ -259,13 +263,6 @@ class RepeatedFrames:
             )
         recording.cut_back(len(recording) - 1)
         recording.append(then.tolist())
-
-
-def _is_same(one: float, other: float) -> bool:
-    """Return whether two numbers are the same, zeros by their sign too."""
-    if np.isnan(one) or np.isnan(other):
-        return bool(np.isnan(one) and np.isnan(other))
-    return bool(one == other and np.signbit(one) == np.signbit(other))
 
 
 def _status_in(folder: Path) -> str | None:

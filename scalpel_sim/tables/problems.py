@@ -81,7 +81,9 @@ def _problem_at(
             text = f"{where} {key} is {as_toml(value)}; it must be {_allowed(kind)}"
             return Problem(text.strip(), at)
     kinds = kinds_of(table)
-    (name,) = re.findall("`(.*)`", what)
+    name = "".join(re.findall("^Object .*`(.*)`$", what))
+    if not name:
+        return Problem(f"{where}: {what}", at)
     if name in kinds:
         return Problem(f"{where or 'the file'} has no {_as_header(name, kinds[name])}", at)
     return Problem(_unknown_key(name, value[name], kinds, where, at, whole), (*at, name))
