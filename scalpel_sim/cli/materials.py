@@ -88,20 +88,14 @@ def print_presets(presets: Sequence[Preset]) -> None:
         specimen = SCENES[preset.name].about
         console.print(f"  run {preset.name}: {specimen}", highlight=False, soft_wrap=True)
         for name, figure in preset.values.items():
-            line = _line(name, figure)
+            mark = "" if figure.is_confirmed else _NOT_CONFIRMED
+            line = f"  {name}{mark}: {_measured(figure)}"
             console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def _marked(figure: SourcedValue, scale: float = 1.0) -> str:
     """Return the number, with a mark if it could not be traced to a measurement."""
     return f"{figure.value * scale:.4g}{'' if figure.is_confirmed else _NOT_CONFIRMED}"
-
-
-def _line(name: str, figure: SourcedValue) -> str:
-    """Return one line on how a figure was measured, and by whom."""
-    mark = "" if figure.is_confirmed else _NOT_CONFIRMED
-    source = f" [{figure.source}]" if figure.source else ""
-    return f"  {name}{mark}: {figure.measured}{source}"
 
 
 def _as_numbers(preset: Preset) -> dict[str, Any]:
@@ -160,17 +154,17 @@ def _keys(
     for key, text in texts_of(table).items():
         lines += _comment(re.sub(r"\[([^]]+)\]\([^)]+\)", r"\1", text))  # links are for pages
         if key in sources:
-            lines += _comment(_origin(sources[key]))
+            figure = sources[key]
+            confirmed = "" if figure.is_confirmed else " (an estimate: not traced to a measurement)"
+            lines += _comment(f"Value: {_measured(figure)}{confirmed}")
         value = msgspec.to_builtins(values[key])
         lines += [f"{key} = {tomlkit.item(value).as_string()}", ""]
     return lines
 
 
-def _origin(figure: SourcedValue) -> str:
+def _measured(figure: SourcedValue) -> str:
     """Return how a figure was measured, and by whom."""
-    source = f" [{figure.source}]" if figure.source else ""
-    confirmed = "" if figure.is_confirmed else " (an estimate: not traced to a measurement)"
-    return f"Value: {figure.measured}{source}{confirmed}"
+    return f"{figure.measured} [{figure.source}]" if figure.source else figure.measured
 
 
 def _comment(text: str) -> list[str]:

@@ -109,29 +109,28 @@ def led_elsewhere(scene: Scene, arm: ArmOptions) -> Scene:
     )
 
 
-def read_figures(path: Path, table: str) -> dict[str, Any]:
+def read_figures(path: Path, table: str, unused: str | None = None) -> dict[str, Any]:
     """Return the figures of a material or a blade that a file gives.
 
     Args:
         path: The file.
         table: `material` or `blade`.
+        unused: The other table, if no option asks for it: a file that has it gets a warning.
 
     Raises:
         UsageError: the file cannot be read, has no such table, or a key or value is wrong.
     """
-    found = getattr(_read(path), table)
-    if found is None:
-        raise UsageError(f"{path} has no table [{table}]; {_HOW_TO_WRITE_ONE}")
-    return given_in(found)
-
-
-def _read(path: Path) -> _MaterialFile:
-    """Return what is in a file of figures."""
     content = read_toml(path, _HOW_TO_WRITE_ONE)
     try:
-        return as_tables(content, _MaterialFile)
+        figures = as_tables(content, _MaterialFile)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
+    found = getattr(figures, table)
+    if found is None:
+        raise UsageError(f"{path} has no table [{table}]; {_HOW_TO_WRITE_ONE}")
+    if unused is not None and getattr(figures, unused) is not None:
+        _log.warning("%s: its [%s] is not used; add --%s %s", path, unused, unused, path)
+    return given_in(found)
 
 
 def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> SceneFile:
@@ -158,18 +157,17 @@ def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> 
 def _with_figures(file: SceneFile, material: str | None, blade: BladeOptions) -> SceneFile:
     """Return a scene with a material by name, or figures of files, and the measures of a blade."""
     content, origins = dict(file.content), dict[str, str]()
-    is_file = material is not None and is_toml_file(material)
-    # A material by name is a choice, which a `[material]` near the blade does not question.
-    if material is None or is_file:
-        _warn_of_unused_tables(None if material is None else Path(material), blade.blade)
-    if material is not None and is_file:
-        content = merged(content, {"material": read_figures(Path(material), "material")})
+    if material is not None and is_toml_file(material):
+        unused = "blade" if blade.blade is None else None
+        figures = read_figures(Path(material), "material", unused)
+        content = merged(content, {"material": figures})
         origins["material"] = material
     elif material is not None:
         content["material"] = {"preset": material}
     in_file: dict[str, Any] = {}
     if blade.blade is not None:
-        in_file = read_figures(blade.blade, "blade")
+        # A material by name is a choice, which a `[material]` near the blade does not question.
+        in_file = read_figures(blade.blade, "blade", "material" if material is None else None)
         origins["blade"] = str(blade.blade)
     given = _given_measures(blade)
     if in_file or given:
@@ -204,14 +202,6 @@ def _measures(usual: Any, given: dict[str, Any]) -> dict[str, Any]:
         return {"thickness": 0.0}
     is_line = not isinstance(usual, dict) or usual.get("thickness") == 0.0
     return given if is_line else usual | given
-
-
-def _warn_of_unused_tables(material: Path | None, blade: Path | None) -> None:
-    """Log a warning where a file has a table that no option asks for."""
-    if material is not None and blade is None and _read(material).blade is not None:
-        _log.warning("%s: its [blade] is not used; add --blade %s to use it", material, material)
-    if blade is not None and material is None and _read(blade).material is not None:
-        _log.warning("%s: its [material] is not used; add --material %s to use it", blade, blade)
 
 
 def _with_strokes(file: SceneFile, arm: ArmOptions) -> SceneFile:
