@@ -40,6 +40,9 @@ LIMITS = (
 )
 """Counters of the bridge that rise where a wrench is changed on its path to the arm."""
 
+_UNITS = {"point": "_m", "force": "_n", "friction": "_n", "depth": "_m", "limit": "_n"}
+"""Ends of the keys of an acting force in JSON."""
+
 _COLUMNS_OF_PARTS = ("edge_force", "pressing_force", "friction_force")
 """Names of the columns of `ForceParts`."""
 
@@ -112,16 +115,7 @@ class Explanation(NamedTuple):
             "limits": self.limits,
             "coupling": self.coupling,
             "forces": [
-                {
-                    "kind": each.kind,
-                    "name": each.name,
-                    "state": each.state,
-                    "point_m": each.point.tolist(),
-                    "force_n": each.force.tolist(),
-                    "friction_n": _finite(each.friction),
-                    "depth_m": _finite(each.depth),
-                    "limit_n": _finite(each.limit),
-                }
+                {key + _UNITS.get(key, ""): _plain(value) for key, value in each._asdict().items()}
                 for each in self.forces
             ],
         }
@@ -248,6 +242,8 @@ def _numbers_of(wrench: Wrench) -> dict[str, list[float]]:
     return {"force_n": wrench.force.tolist(), "torque_nm": wrench.torque.tolist()}
 
 
-def _finite(number: float) -> float | None:
-    """Return a number, or None for one that is not finite, which JSON has not."""
-    return number if math.isfinite(number) else None
+def _plain(value: Any) -> Any:
+    """Return a value for JSON: None for a number that is not finite, which JSON has not."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -84,28 +84,20 @@ class KernelSet(NamedTuple):
         has_table = scene.world.table is not None or bool(scene.graspers)
         return cls(law, solver.scheme, solver.relaxation, *how, relaxes, is_held, has_table)
 
-    @property
-    def _prony(self) -> tuple[tuple[float, float], ...]:
-        """Return a Prony series that needs this set."""
-        return ((0.5, 1.0),) if self.relaxes else ()
-
-    def solver(self) -> SolverSettings:
-        """Return settings that need this set."""
-        return SolverSettings(
-            scheme=self.scheme,
-            relaxation=self.relaxation,
-            precision=self.precision,
-            audit=self.audit,
-        )
-
     def body(self, mesh: TetrahedralMesh, fixed: str = "none") -> Tissue:
         """Return a tissue that needs this set."""
+        prony = ((0.5, 1.0),) if self.relaxes else ()
         return Tissue(
             mesh,
-            PHANTOM if self.law == "springs" else replace(PARENCHYMA, prony=self._prony),
+            PHANTOM if self.law == "springs" else replace(PARENCHYMA, prony=prony),
             fixed=fixed_nodes(mesh, fixed),
             blade=BladeShape() if self.has_sides else None,
-            solver=self.solver(),
+            solver=SolverSettings(
+                scheme=self.scheme,
+                relaxation=self.relaxation,
+                precision=self.precision,
+                audit=self.audit,
+            ),
         )
 
 
@@ -242,16 +234,15 @@ def _incise_and_cut(kernels: KernelSet) -> None:
     _cut(kernels)
 
 
-def _move_two_pieces(kernels: KernelSet) -> None:
-    """Advance two falling pieces, which may touch, by a step: forces, integration and contact."""
+def _move(kernels: KernelSet) -> None:
+    """Advance two falling pieces, which may touch, by a step, and lead an arm without any tissue.
+
+    That compiles forces, integration and contact, and what a bridge computes in a frame.
+    """
     mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
     apart = np.vstack([mesh.positions, mesh.positions + 2.0 * _SIDE])
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
     kernels.body(TetrahedralMesh(apart, both)).step(None, _DT)
-
-
-def _lead_an_arm() -> None:
-    """Lead an arm without any tissue, and compile what a bridge computes in a frame."""
     compiled_arithmetic()
     arm = Arm()
     pose = arm.blade.segment()
@@ -259,12 +250,6 @@ def _lead_an_arm() -> None:
     StrokeFollower(arm.hand, stroke, TissueFrame()).lead(0.0)
     stroke.pose(0.0)
     CollisionMonitor(arm).check()
-
-
-def _move(kernels: KernelSet) -> None:
-    """Move two pieces, and an arm."""
-    _move_two_pieces(kernels)
-    _lead_an_arm()
 
 
 def _edge(fraction: float) -> BladeSegment:
