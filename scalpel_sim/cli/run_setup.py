@@ -95,52 +95,35 @@ def prepared_run(
         LinkError: the tissue is elsewhere, and cannot be reached.
         Interrupted: a signal came before it was prepared.
     """
+    client = options.client
     with Plotter() as plotter, ExitStack() as stack:  # it loads while the run is prepared
         try:
-            link, scene, simulation, settings = _prepared(
-                name, options, audits=audits, relaxation=relaxation, is_led=is_led
-            )
+            if client.key is not None and client.connect is None:
+                raise UsageError(
+                    "--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it"
+                )
+            check_exports(options.output.export)
+            checkpoint_seconds = _checkpoint_seconds(options)
+            if client.connect is None:
+                link, scene, settings = _tissue_here(name, options, audits, relaxation)
+            else:
+                link, scene, settings = _tissue_elsewhere(name, options, client.connect)
+            stack.callback(link.close)
+            simulation = prepare(scene, link, is_led=is_led)
+            check_steps_of_frames(simulation)
         except KeyboardInterrupt as error:
             raise Interrupted(f"{error} before the run began; no file was written") from error
-        stack.callback(link.close)
         yield PreparedRun(
             simulation,
             scene,
             _folder(options.output, scene),
             settings | {"arm": simulation.arm.name},
             plotter,
-            _checkpoint_seconds(options),
+            checkpoint_seconds,
             options.output.export,
-            options.client.connect is None,
+            client.connect is None,
             options.printing,
         )
-
-
-def _prepared(
-    name: str | None,
-    options: RunOptions,
-    *,
-    audits: bool,
-    relaxation: str | None,
-    is_led: bool,
-) -> tuple[TissueLink, Scene, Simulation, dict[str, Any]]:
-    """Return the tissue, the scene, the simulation, and what the command line resolved to."""
-    client = options.client
-    if client.key is not None and client.connect is None:
-        raise UsageError("--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it")
-    check_exports(options.output.export)
-    _checkpoint_seconds(options)
-    if client.connect is None:
-        link, scene, settings = _tissue_here(name, options, audits, relaxation)
-    else:
-        link, scene, settings = _tissue_elsewhere(name, options, client.connect)
-    try:
-        simulation = prepare(scene, link, is_led=is_led)
-        check_steps_of_frames(simulation)
-        return link, scene, simulation, settings
-    except BaseException:
-        link.close()
-        raise
 
 
 def _tissue_here(
