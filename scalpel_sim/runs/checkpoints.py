@@ -51,33 +51,27 @@ class RunMark(
     """Files that grow with the run, by name in its folder."""
 
 
-class Noted(NamedTuple):
-    """Content of a journal."""
-
-    plan: RunPlan | None
-    """The last plan; None: there is none whose checksum holds."""
-    marks: list[RunMark]
-    """Marks whose checksum holds, in the order in which they were written."""
-    ends: list[int]
-    """Where in the file the line of each mark ends [bytes]."""
-
-
 def line_of(note: RunPlan | RunMark) -> bytes:
     """Return a note as a line of a journal: a checksum, and JSON."""
     content = msgspec.json.encode(note)
     return b"%08x %b\n" % (zlib.crc32(content), content)
 
 
-def read_journal(path: Path) -> Noted:
+def read_journal(path: Path) -> tuple[RunPlan | None, list[tuple[RunMark, int]]]:
     """Return the content of a journal. A line that is damaged, or not whole, is passed over.
 
     So is one of another version of the program.
+
+    Returns:
+        plan: The last plan; None: there is none whose checksum holds.
+        marks: Marks whose checksum holds, in the order in which they were written, each with the
+            place in the file at which its line ends [bytes].
 
     Raises:
         OSError: it cannot be read.
     """
     data = path.read_bytes() if path.exists() else b""
-    plan, marks, ends, end = None, [], [], 0
+    plan, marks, end = None, [], 0
     for line in data.split(b"\n"):
         end += len(line) + 1
         crc, content = line[:_CRC], line[_CRC + 1 :]
@@ -90,9 +84,8 @@ def read_journal(path: Path) -> Noted:
         if isinstance(note, RunPlan):
             plan = note
         else:
-            marks.append(note)
-            ends.append(end)
-    return Noted(plan, marks, ends)
+            marks.append((note, end))
+    return plan, marks
 
 
 _decoder: msgspec.json.Decoder[RunPlan | RunMark] = msgspec.json.Decoder(RunPlan | RunMark)

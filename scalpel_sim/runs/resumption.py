@@ -115,8 +115,8 @@ def resumption_of(folder: Path) -> Resumption:
         raise UsageError(f"--resume {folder}: that run is complete; there is nothing to go on with")
     with Checkpoints(folder) as checkpoints:
         found = checkpoints.read()
-    noted = read_journal(folder / JOURNAL)
-    plan = found[0].plan if noted.plan is None and found else noted.plan
+    plan, noted = read_journal(folder / JOURNAL)
+    plan = found[0].plan if plan is None and found else plan
     if not (folder / SCENE).exists() and (plan is None or plan.scene is None):
         raise UsageError(f"--resume {folder}: {_why_no_scene(folder, plan)}")
     if plan is None:
@@ -126,17 +126,13 @@ def resumption_of(folder: Path) -> Resumption:
             folder,
             SCENE,
         )
-    marks = [*(each.mark for each in reversed(found)), *noted.marks]
+    marks = [*(each.mark for each in reversed(found)), *(mark for mark, _ in noted)]
     last = max(reversed(marks), key=lambda mark: mark.written[FORCES].n_bytes, default=None)
     if last is not None:
         _expect_recorded(folder, plan, last)
     whole = sums_that_hold(folder / FORCES, (mark.written[FORCES] for mark in marks))
     forces = max(whole, default=FileSum())
-    n_journal = [
-        end
-        for mark, end in zip(noted.marks, noted.ends, strict=True)
-        if mark.written[FORCES] in whole
-    ]
+    n_journal = [end for mark, end in noted if mark.written[FORCES] in whole]
     recorded = read_forces(folder / FORCES, forces.n_bytes) if forces.n_bytes else Recording()
     _warn_of_rows(folder / FORCES, marks, recorded, forces)
     checkpoint = _last_that_holds(folder, found, whole)
