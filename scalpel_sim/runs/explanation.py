@@ -13,6 +13,7 @@ import numpy as np
 
 from bridge import InProcessLink
 from scalpel_sim.errors import UsageError
+from scalpel_sim.output.report import SATURATIONS
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.columns import ForceParts
@@ -29,15 +30,7 @@ from tissue import ActingForce, FloatArray, Wrench
 OF_BLADE = ("edge", "face", "back", "end", "strand")
 """Kinds of forces of the blade, which add up to the wrench on it."""
 
-LIMITS = (
-    "force_limited",
-    "torque_limited",
-    "slew_limited",
-    "not_finite",
-    "absurd",
-    "silent",
-    "faded",
-)
+LIMITS = (*SATURATIONS, "not_finite")
 """Counters of the bridge that rise where a wrench is changed on its path to the arm."""
 
 _UNITS = {"point": "_m", "force": "_n", "friction": "_n", "depth": "_m", "limit": "_n"}
