@@ -107,14 +107,13 @@ def _run(
 
         options = RunOptions(tissue, arm, client, output, printing)
         is_led = hand == "device"
+        check_device_options(device, is_led=is_led)
         if output.resume is not None:
             if scene is not None or is_led:
                 raise UsageError(
                     "--resume goes on with the run in its folder; omit the scene and --hand"
                 )
-            check_device_options(device, is_led=False)
             return expect_no_warnings(perform_resumed(output.resume, options), output)
-        check_device_options(device, is_led=is_led)
         if scene is not None and is_toml_file(scene) and is_case(Path(scene)):
             expect_no_options(
                 (tissue, arm, client, replace(output, out=None)),

@@ -118,10 +118,7 @@ def perform(
     with (
         progress(seconds, prepared.printing) if hand is None else nullcontext() as advance,
         Outputs(
-            prepared.folder,
-            prepared.plotter,
-            simulation.recording.columns,
-            resumption,
+            prepared.folder, prepared.plotter, simulation.recording.columns, resumption
         ) as outputs,
         StopSignals() as stop,
         outputs.replay_log() as log,
