@@ -220,9 +220,9 @@ def _end_records(folder: Path, resumption: Resumption) -> None:
 
 
 def end_record(path: Path, t_end: float, n_bytes: int | None = None) -> None:
-    """Cut off a last line that is not whole, and have the last pose last until a time.
+    """Cut off a last line that is not whole, and extend the last pose to a time.
 
-    Until then the hand rested, or it would have left another row.
+    Until then the hand rested, or there would be another row.
 
     Args:
         path: `stroke.csv`, or the file of a grasper.

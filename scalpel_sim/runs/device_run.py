@@ -26,7 +26,7 @@ from scalpel_sim.runs.run import perform
 from scalpel_sim.scene.checks import LONGEST_RUN
 
 SECONDS_PER_WAIT = 0.02
-"""How often it is looked whether a waiting run is to end [s]."""
+"""Time between two checks whether a waiting run is to end [s]."""
 
 LONGEST_WATCHDOG = 10.0
 """Longest time of the watchdog [s]: a blade that is led for longer by nobody is a mistake."""

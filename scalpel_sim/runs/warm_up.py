@@ -45,8 +45,8 @@ _SIDE = 0.02
 """Length of the sides of the block that is cut [m]."""
 N_STEPS = 40
 _DT = 1e-3
-_SECONDS_PER_LOOK = 0.1
-"""How often the progress of the processes is looked at [s]."""
+_SECONDS_PER_CHECK = 0.1
+"""Time between two checks of the progress of the processes [s]."""
 USUAL_NUMBER = 838
 """How many kernels a set has, about: the end of the progress bar, unless there are more."""
 
@@ -141,7 +141,7 @@ def compile_ahead(sets: Sequence[KernelSet], on_progress: Progress = lambda n, n
                         raise SignalInterrupt(stop.reason)
                     found = n_compiled_kernels()
                     on_progress(found, max(found, USUAL_NUMBER))
-                    time.sleep(_SECONDS_PER_LOOK)
+                    time.sleep(_SECONDS_PER_CHECK)
                 are_done &= not any(process.returncode for process in processes)
     if are_done:
         found = n_compiled_kernels()
