@@ -29,7 +29,7 @@ from tissue import MATERIALS
 
 _log = logging.getLogger("scalpel_sim")
 
-SECONDS_PER_WAIT = 0.02
+_SECONDS_PER_WAIT = 0.02
 """Time between two checks whether somebody has taken hold of the blade [s]."""
 
 SECONDS_PER_CHECK = 0.2
@@ -185,7 +185,7 @@ class LiveSession:
 
         def wait() -> None:
             controls.on_wait()
-            time.sleep(SECONDS_PER_WAIT)
+            time.sleep(_SECONDS_PER_WAIT)
 
         def has_begun() -> bool:
             return any(isinstance(command, _BEGIN) for command in list(controls.commands))
