@@ -164,14 +164,16 @@ def expect_no_warnings(summary: "Summary", options: RunOutputOptions) -> None:
 
 
 def wait_until(
+    message: str,
     has_begun: Callable[[], bool],
     what: str,
     on_wait: Callable[[], None],
     is_running: Callable[[], bool],
 ) -> None:
-    """Wait until a run begins.
+    """Print a message, and wait until a run begins.
 
     Args:
+        message: What to print.
         has_begun: Whether it does.
         what: What begins it, for messages.
         on_wait: Called time and again; it takes some milliseconds.
@@ -182,6 +184,7 @@ def wait_until(
         RunError: the viewer has ended before.
     """
     with StopSignals() as stop:
+        say(message)  # from now on Ctrl-C ends it without a traceback
         while not has_begun():
             if stop.reason is not None:
                 raise Interrupted(f"{stop.reason} before {what}")

@@ -117,8 +117,8 @@ def perform_device(
         RunError: nothing shows it any more before a device came; or the run failed.
     """
     hand, server, controls = led
-    say(f"waiting for a device at {server.address}")
     wait_until(
+        f"waiting for a device at {server.address}",
         lambda: hand.has_begun,
         "a device took hold of the blade",
         lambda: server.serve_for(SECONDS_PER_WAIT),

@@ -190,8 +190,13 @@ class LiveSession:
         def has_begun() -> bool:
             return any(isinstance(command, _BEGIN) for command in list(controls.commands))
 
-        say(f"open {viewer.url} and lead the blade there")
-        wait_until(has_begun, "anybody took hold of the blade", wait, lambda: viewer.is_running)
+        wait_until(
+            f"open {viewer.url} and lead the blade there",
+            has_begun,
+            "anybody took hold of the blade",
+            wait,
+            lambda: viewer.is_running,
+        )
         return any(isinstance(command, Begin) for command in list(controls.commands))
 
     def _after(self, run: _LiveRun, has_files: bool) -> _LiveRun | None:
