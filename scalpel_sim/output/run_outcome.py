@@ -10,8 +10,7 @@ import numpy as np
 from bridge import TissueDescription, TissueFrame
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.asked import asked_area, first_areas
-from scalpel_sim.strokes.asked import asked_pieces, n_large
+from scalpel_sim.strokes.asked import asked_area, asked_pieces, first_areas, n_large
 from scalpel_sim.strokes.expected_force import length_inside
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.stroke import Stroke
