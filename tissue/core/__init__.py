@@ -10,6 +10,7 @@ In the order in which they are best read:
     vec3             points and vectors of three numbers
     three_vectors    the edge of a blade, and a wrench
     lazy_fields      tuples whose fields are made on first use
+    sized            shapes of the arrays of structs
     structs          structs of arrays that a kernel gets as one pointer
     hash_table       a hash table in arrays
     simd             vectors of eight doubles

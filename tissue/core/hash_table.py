@@ -9,10 +9,9 @@ A slot holds one number: a key, or where the caller keeps the key. The caller co
 The slot is then that of the key, or the free one where it belongs. Items are removed all at once.
 """
 
-import numpy as np
-
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 
 
@@ -21,16 +20,16 @@ class HashTable(Arrays):
 
     epoch: IntCell
     """Number of times that the table was cleared, plus one."""
-    item: IntArray
+    item: IntArray = sized("slots")
     """Number in each slot, shape (n_slots,); `n_slots` is a power of two."""
-    stamp: IntArray
+    stamp: IntArray = sized("slots")
     """Epoch in which each slot was filled, shape (n_slots,). In any other epoch it is free."""
 
 
 def new_hash_table(n_slots: int) -> HashTable:
     """Return an empty table of `n_slots` slots or more: twice the items, so that searches end."""
     n_slots = 1 << (n_slots - 1).bit_length()
-    return HashTable(epoch=1, item=np.zeros(n_slots, np.int64), stamp=np.zeros(n_slots, np.int64))
+    return HashTable.new({"slots": n_slots}, epoch=1)
 
 
 @kernel

@@ -13,8 +13,9 @@ import functools
 import hashlib
 import inspect
 from array import array
+from collections.abc import Mapping
 from operator import attrgetter
-from typing import Annotated, Any, ClassVar, NoReturn, Self
+from typing import Annotated, Any, ClassVar, NoReturn, Self, get_args
 
 import numpy as np
 from llvmlite import ir
@@ -32,6 +33,7 @@ from numba.extending import (
 )
 from numba.np import arrayobj, numpy_support
 
+from tissue.core.sized import Sized
 from tissue.core.vec3 import Vec3
 
 IntCell = Annotated[int, "cell"]
@@ -95,7 +97,8 @@ def _cell(name: str, place: int, is_float: bool) -> property:
 class Arrays:
     """Base of structs of C-contiguous arrays, numbers, vectors, and other such structs.
 
-    A subclass annotates its fields in order and is made from keywords. Only the elements of arrays
+    A subclass annotates its fields in order and is made from keywords, or by `new` where the shapes
+    of its arrays are declared (`tissue.core.sized`). Only the elements of arrays
     and the fields annotated as `IntCell` or `FloatCell` change. All objects of a subclass have
     fields of the same types, unless it is made with `two_precisions=True`: then arrays may be of
     doubles in one object and of singles in another, and kernels are compiled for each.
@@ -109,6 +112,7 @@ class Arrays:
     _most_types: ClassVar[int] = 1
     _cells: ClassVar[tuple[str, ...]] = ()
     _layout: ClassVar[type[ctypes.Structure]] = ctypes.Structure
+    _sized: ClassVar[dict[str, Sized]] = {}
     address: int
     """Where the table is in memory; the object keeps it and the arrays alive."""
 
@@ -122,6 +126,9 @@ class Arrays:
         cls._layout = type(cls.__name__, (ctypes.Structure,), layout)
         for place, name in enumerate(cls._cells):
             setattr(cls, name, _cell(name, place, fields[name] is FloatCell))
+        cls._sized = {name: each for name, each in vars(cls).items() if isinstance(each, Sized)}
+        for name in cls._sized:
+            delattr(cls, name)
 
     def __init__(self, **fields: Any) -> None:
         annotations = type(self).__annotations__
@@ -164,6 +171,38 @@ class Arrays:
                 raise TypeError(f"{type(self).__name__} has fields of other types than before")
             known[key] = ArraysType(type(self).__name__, tuple(kinds), len(self._cells))
         self._numba_type_ = known[key]
+
+    @classmethod
+    def new(cls, sizes: Mapping[str, int], *, real: type = np.float64, **fields: Any) -> Self:
+        """Return a struct whose cells are 0 and whose arrays hold nothing yet, but for `fields`.
+
+        Args:
+            sizes: Sizes, by the names that the shapes of its arrays have for them.
+            real: Precision of floats in arrays for vectors.
+            fields: Cells and arrays that are other, and all fields without a shape.
+        """
+        made: dict[str, Any] = dict.fromkeys(cls._cells, 0)
+        for name, each in cls._sized.items():
+            if name not in fields:
+                dtype = get_args(get_args(cls.__annotations__[name])[1])[0]
+                is_real = each.is_for_vectors and dtype is np.float64
+                made[name] = each.array(sizes, real if is_real else dtype)
+        return cls(**(made | fields))
+
+    def grown(self, sizes: Mapping[str, int]) -> Self:
+        """Return a struct with room for that much along the first axes of its arrays.
+
+        What is in the arrays stays; further rows hold what new ones do. Arrays of other sizes are
+        shared with this struct.
+        """
+        larger = {}
+        for name, each in self._sized.items():
+            if each.grows_with in sizes:
+                old = getattr(self, name)
+                rows = each._replace(shape=(each.shape[0], *old.shape[1:]))
+                larger[name] = rows.array(sizes, old.dtype)
+                larger[name][: len(old)] = old
+        return self.replaced(**larger)
 
     def replaced(self, **fields: Any) -> Self:
         """Return a struct with these fields in place of its own; cells are copied."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.geometry.exact_predicates import Lattice, nearest
@@ -25,29 +26,29 @@ _FARTHEST = 1 << 62
 class Path(Arrays):
     """Displacements of the n samples of the edge through the body at rest in one step."""
 
-    t0: FloatArray
+    t0: FloatArray = sized("samples", 3)
     """Rest positions of the samples at the start of the step [m], shape (n, 3)."""
-    t1: FloatArray
+    t1: FloatArray = sized("samples", 3)
     """Rest positions of the samples at the end of the step [m], shape (n, 3)."""
-    lattice_t0: IntArray
+    lattice_t0: IntArray = sized("samples", 3)
     """`t0` on the lattice, shape (n, 3)."""
-    lattice_t1: IntArray
+    lattice_t1: IntArray = sized("samples", 3)
     """`t1` on the lattice, shape (n, 3)."""
-    forward: FloatArray
+    forward: FloatArray = sized("samples", 3)
     """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
-    sideways: FloatArray
+    sideways: FloatArray = sized("samples", 3)
     """Unit normal of the blade's flat, in the body at rest: the side +1; shape (n, 3)."""
-    direction: FloatArray
+    direction: FloatArray = sized(2, 3)
     """Direction in which the tip and the heel went last, averaged over a node size, shape (2, 3).
     It is shorter than 1 at first, and where the direction changes; 0 outside the tissue."""
-    seed: IntArray
+    seed: IntArray = sized("samples", fill=-1)
     """Tetrahedron at or beside each sample, or -1; shape (n,)."""
-    member: BoolArray
+    member: BoolArray = sized("samples")
     """Whether each sample is part of the chain at the end of the step, shape (n,)."""
-    known: BoolArray
+    known: BoolArray = sized("samples")
     """Whether each sample was part of the chain in the step before, so that its `t1` is where it
     was then; shape (n,)."""
-    linked: BoolArray
+    linked: BoolArray = sized("samples")
     """Whether each sample and the next one span a piece of the cut surface, shape (n,)."""
     has_left: IntCell
     """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
@@ -55,7 +56,7 @@ class Path(Arrays):
     """1 if the tip or the heel has held tissue in this incision; else 0."""
     is_through: IntCell
     """1 if all tissue that the edge holds is left ahead in this step, through the skin; else 0."""
-    boxes: IntArray
+    boxes: IntArray = sized(6, "samples")
     """Lowest and highest lattice point of the quad from each sample to the next, and last those of
     all quads that are linked, coordinate by coordinate: shape (6, n). Where samples are not linked
     the lowest is above the highest."""
@@ -63,23 +64,7 @@ class Path(Arrays):
 
 def new_path(n: int) -> Path:
     """Return a path of `n` samples that spans nothing yet."""
-    return Path(
-        t0=np.zeros((n, 3)),
-        t1=np.zeros((n, 3)),
-        lattice_t0=np.zeros((n, 3), np.int64),
-        lattice_t1=np.zeros((n, 3), np.int64),
-        forward=np.zeros((n, 3)),
-        sideways=np.zeros((n, 3)),
-        direction=np.zeros((2, 3)),
-        seed=np.full(n, -1, np.int64),
-        member=np.zeros(n, np.bool_),
-        known=np.zeros(n, np.bool_),
-        linked=np.zeros(n, np.bool_),
-        has_left=0,
-        has_end_in=0,
-        is_through=0,
-        boxes=np.zeros((6, n), np.int64),
-    )
+    return Path.new({"samples": n})
 
 
 class Plane(NamedTuple):

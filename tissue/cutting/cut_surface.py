@@ -4,12 +4,10 @@ It is a surface in the body at rest, where cracks are closed, tetrahedra are nev
 nothing moves: the anchors of the edge move along material points.
 """
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
-from tissue.mesh.body import grown
 
 
 class CutSurface(Arrays):
@@ -17,54 +15,30 @@ class CutSurface(Arrays):
 
     number: IntCell
     """Number of the incision, from 1."""
-    node_stamp: IntArray
+    node_stamp: IntArray = sized("nodes")
     """Incision in which each node's entries were written, shape (node capacity,)."""
-    offset: FloatArray
+    offset: FloatArray = sized("nodes", fill=-1.0)
     """Distance of an on-surface node from the true surface [m], -1 for others; (node capacity,)."""
-    past_offset: FloatArray
+    past_offset: FloatArray = sized("nodes", fill=-1.0)
     """Largest offset that a node had on earlier cut surfaces [m], -1 if none; (node capacity,)."""
-    side: IntArray
+    side: IntArray = sized("nodes")
     """Side of the cut surface that a node was found on, +1 or -1, 0 if unknown; (node
     capacity,)."""
-    nodes: IntArray
+    nodes: IntArray = sized("nodes")
     """The nodes on the cut surface, in the order in which they came, shape (node capacity,)."""
     n_nodes: IntCell
     """Number of nodes on the cut surface."""
-    tetrahedron_stamp: IntArray
+    tetrahedron_stamp: IntArray = sized("tetrahedra")
     """Incision in which each tetrahedron's side was decided, shape (tetrahedron capacity,)."""
-    tetrahedron_side: IntArray
+    tetrahedron_side: IntArray = sized("tetrahedra")
     """Side of the cut surface that a tetrahedron is on, 0 if undecided; (tetrahedron capacity,)."""
-    front: IntArray
+    front: IntArray = sized(2, fill=-1)
     """Last node of the crack front at the tip and at the heel, or -1; shape (2,)."""
 
 
 def new_cut_surface(n_nodes: int, n_tetrahedra: int) -> CutSurface:
     """Return a cut surface with nothing on it."""
-    return CutSurface(
-        number=1,
-        node_stamp=np.zeros(n_nodes, np.int64),
-        offset=np.full(n_nodes, -1.0),
-        past_offset=np.full(n_nodes, -1.0),
-        side=np.zeros(n_nodes, np.int64),
-        nodes=np.zeros(n_nodes, np.int64),
-        n_nodes=0,
-        tetrahedron_stamp=np.zeros(n_tetrahedra, np.int64),
-        tetrahedron_side=np.zeros(n_tetrahedra, np.int64),
-        front=np.full(2, -1, np.int64),
-    )
-
-
-def grown_cut_surface(surface: CutSurface, n_nodes: int, n_tetrahedra: int) -> CutSurface:
-    """Return the cut surface with room for that many nodes and tetrahedra."""
-    return surface.replaced(
-        node_stamp=grown(surface.node_stamp, n_nodes),
-        offset=grown(surface.offset, n_nodes, -1.0),
-        past_offset=grown(surface.past_offset, n_nodes, -1.0),
-        side=grown(surface.side, n_nodes),
-        nodes=grown(surface.nodes, n_nodes),
-        tetrahedron_stamp=grown(surface.tetrahedron_stamp, n_tetrahedra),
-        tetrahedron_side=grown(surface.tetrahedron_side, n_tetrahedra),
-    )
+    return CutSurface.new({"nodes": n_nodes, "tetrahedra": n_tetrahedra}, number=1)
 
 
 @kernel

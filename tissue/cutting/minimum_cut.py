@@ -11,6 +11,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.geometry.tetrahedron import face_area
 from tissue.mesh.body import Body
@@ -23,48 +24,35 @@ ROUNDED_AREA = 1e-9
 class FlowGraph(Arrays):
     """The flow between two lips. Without terminals all entries are 0 and nothing is stored."""
 
-    lip: IntArray
+    lip: IntArray = sized("tetrahedra")
     """Lip that each tetrahedron is of, +1 or -1, 0 for none; shape (tetrahedron capacity,)."""
-    terminals: IntArray
+    terminals: IntArray = sized("tetrahedra")
     """The tetrahedra that were put on a lip, shape (tetrahedron capacity,)."""
     n_terminals: IntCell
     """Number of entries in `terminals`."""
-    flow: FloatArray
+    flow: FloatArray = sized("tetrahedra", 4)
     """Flow out of each tetrahedron through each face [m2], shape (tetrahedron capacity, 4)."""
-    has_flow: IntArray
+    has_flow: IntArray = sized("tetrahedra")
     """Whether a tetrahedron is in `carriers`, shape (tetrahedron capacity,)."""
-    carriers: IntArray
+    carriers: IntArray = sized("tetrahedra")
     """The tetrahedra that flow was sent through, shape (tetrahedron capacity,)."""
     n_carriers: IntCell
     """Number of entries in `carriers`."""
-    level: IntArray
+    level: IntArray = sized("tetrahedra")
     """Faces between the lip +1 and each tetrahedron, where visited; (tetrahedron capacity,)."""
-    next_face: IntArray
+    next_face: IntArray = sized("tetrahedra")
     """Face of each tetrahedron to try next, where visited; shape (tetrahedron capacity,)."""
-    queue: IntArray
+    queue: IntArray = sized("tetrahedra")
     """Tetrahedra in the order in which they were visited, shape (tetrahedron capacity,)."""
     n_queued: IntCell
     """Number of entries in `queue`: in the end the side of the minimum cut that lip +1 is on."""
-    stack: IntArray
+    stack: IntArray = sized("tetrahedra")
     """Faces that a path goes through, as 4 * tetrahedron + face; (tetrahedron capacity,)."""
 
 
 def new_flow_graph(n_tetrahedra: int) -> FlowGraph:
     """Return a graph without lips, for a body with room for that many tetrahedra."""
-    return FlowGraph(
-        lip=np.zeros(n_tetrahedra, np.int64),
-        terminals=np.zeros(n_tetrahedra, np.int64),
-        n_terminals=0,
-        flow=np.zeros((n_tetrahedra, 4)),
-        has_flow=np.zeros(n_tetrahedra, np.int64),
-        carriers=np.zeros(n_tetrahedra, np.int64),
-        n_carriers=0,
-        level=np.zeros(n_tetrahedra, np.int64),
-        next_face=np.zeros(n_tetrahedra, np.int64),
-        queue=np.zeros(n_tetrahedra, np.int64),
-        n_queued=0,
-        stack=np.zeros(n_tetrahedra, np.int64),
-    )
+    return FlowGraph.new({"tetrahedra": n_tetrahedra})
 
 
 @kernel

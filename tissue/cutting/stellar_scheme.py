@@ -14,7 +14,7 @@ from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
-from tissue.cutting.cut_surface import begin_cut_surface, grown_cut_surface, new_cut_surface
+from tissue.cutting.cut_surface import begin_cut_surface, new_cut_surface
 from tissue.cutting.finishing import finish_cut_surface
 from tissue.cutting.minimum_cut import new_flow_graph
 from tissue.cutting.separation import close_cut_surface, open_cut_surface
@@ -127,7 +127,7 @@ class StellarScheme:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._surface = grown_cut_surface(self._surface, n_nodes, n_tetrahedra)
+        self._surface = self._surface.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
         self._scratch = self._scratch.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._graph = new_flow_graph(n_tetrahedra)
         self._cut = None

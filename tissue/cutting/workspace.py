@@ -1,15 +1,14 @@
 """All that a cut step reads and writes: body, path, cut surface, changes and scratch."""
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.hash_table import HashTable, new_hash_table
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import dot, sub, vec3
 from tissue.cutting.blade_path import Path, plane_near
 from tissue.cutting.cut_surface import CutSurface, on_cut_surface, put_on_cut_surface
-from tissue.mesh.body import Body, grown
+from tissue.mesh.body import Body
 from tissue.mesh.changes import CHANGES, LISTS, Change
 from tissue.mesh.star import LARGEST_STAR, Visits
 
@@ -40,34 +39,34 @@ class SnapLimits(Arrays):
 class CutScratch(Arrays):
     """Scratch of a cut step."""
 
-    active: IntArray
+    active: IntArray = sized("active")
     """Active tetrahedra, which the swept edge passes through; shape (room,)."""
-    segments: IntArray
+    segments: IntArray = sized("active", 2)
     """First and last segment of the edge near each active tetrahedron, shape (room, 2)."""
     n_active: IntCell
     """Number of active tetrahedra."""
-    previous: IntArray
+    previous: IntArray = sized((2, "active"))
     """Tetrahedra that were active or changed in the step before, shape (2 * room,)."""
     n_previous: IntCell
     """Number of tetrahedra in `previous`."""
-    around: IntArray
+    around: IntArray = sized(LARGEST_STAR)
     """A star, shape (LARGEST_STAR,)."""
-    around_too: IntArray
+    around_too: IntArray = sized(LARGEST_STAR)
     """Another star, shape (LARGEST_STAR,)."""
-    parents: IntArray
+    parents: IntArray = sized(LARGEST_STAR)
     """Tetrahedra being split, shape (LARGEST_STAR,)."""
-    parent_links: IntArray
+    parent_links: IntArray = sized(LARGEST_STAR, 4)
     """Links of each parent before the split, shape (LARGEST_STAR, 4)."""
-    children: IntArray
+    children: IntArray = sized(LARGEST_STAR, 3)
     """Tetrahedra that each parent becomes, shape (LARGEST_STAR, 3)."""
-    place: IntArray
+    place: IntArray = sized("tetrahedra")
     """Index in `parents` of each tetrahedron that is split, shape (tetrahedron capacity,)."""
-    crossing: IntArray
+    crossing: IntArray = sized("crossings", 3)
     """Two nodes of each crossed edge and the segment that crossed it, shape (n_room, 3)."""
-    crossing_at: FloatArray
+    crossing_at: FloatArray = sized("crossings", 2)
     """Fraction along each crossed edge, from its first node, and the rank by which crossings are
     sorted: how far the fraction is from 1/2; shape (n_room, 2)."""
-    order: IntArray
+    order: IntArray = sized("crossings")
     """Order in which crossings are handled, shape (n_room,)."""
     n_crossings: IntCell
     """Number of crossed edges."""
@@ -89,34 +88,14 @@ class Cut(Arrays):
 
 def new_cut_scratch(n_tetrahedra: int) -> CutScratch:
     """Return scratch for a body with room for that many tetrahedra."""
-    return CutScratch(
-        active=np.zeros(CHANGES, np.int64),
-        segments=np.zeros((CHANGES, 2), np.int64),
-        n_active=0,
-        previous=np.zeros(2 * CHANGES, np.int64),
-        n_previous=0,
-        around=np.zeros(LARGEST_STAR, np.int64),
-        around_too=np.zeros(LARGEST_STAR, np.int64),
-        parents=np.zeros(LARGEST_STAR, np.int64),
-        parent_links=np.zeros((LARGEST_STAR, 4), np.int64),
-        children=np.zeros((LARGEST_STAR, 3), np.int64),
-        place=np.zeros(n_tetrahedra, np.int64),
-        crossing=np.zeros((CROSSINGS, 3), np.int64),
-        crossing_at=np.zeros((CROSSINGS, 2)),
-        order=np.zeros(CROSSINGS, np.int64),
-        n_crossings=0,
-        tested=new_hash_table(HASH_SLOTS),
-    )
+    sizes = {"tetrahedra": n_tetrahedra, "active": CHANGES, "crossings": CROSSINGS}
+    return CutScratch.new(sizes, tested=new_hash_table(HASH_SLOTS))
 
 
 def scratch_with_twice_the_room(scratch: CutScratch) -> CutScratch:
     """Return scratch with twice the room in its lists, and the same in them."""
-    lists = ("active", "segments", "previous", "crossing", "crossing_at", "order")
-    larger = {name: getattr(scratch, name) for name in lists}
-    return scratch.replaced(
-        tested=new_hash_table(2 * len(scratch.tested.item)),
-        **{name: grown(array, 2 * len(array)) for name, array in larger.items()},
-    )
+    sizes = {"active": 2 * len(scratch.active), "crossings": 2 * len(scratch.crossing)}
+    return scratch.grown(sizes).replaced(tested=new_hash_table(2 * len(scratch.tested.item)))
 
 
 @kernel

@@ -17,14 +17,13 @@ keep the volume of tetrahedra by such a term; here it acts on one side.
 
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import tetrahedron_volume
-from tissue.mesh.body import Body, grown
+from tissue.mesh.body import Body
 
 J_LIMIT: Final = 0.3
 """J below which a tetrahedron resists. Larger: tissue that is merely pressed is no more that of the
@@ -61,15 +60,15 @@ class Collapsing(Arrays):
     """How far J of those that are not listed may fall until one may be listed."""
     highest: FloatCell
     """Bound on w^2 at their nodes, with that of the springs [1/s2]; 0 where none is listed."""
-    listed: IntArray
+    listed: IntArray = sized("tetrahedra")
     """The tetrahedra, shape (tetrahedron capacity,)."""
-    stiffness: FloatArray
+    stiffness: FloatArray = sized("tetrahedra")
     """k of each tetrahedron that is listed [J], 0 of others; shape (tetrahedron capacity,)."""
-    limit: FloatArray
+    limit: FloatArray = sized("tetrahedra")
     """J below which each of them resists, shape (tetrahedron capacity,)."""
-    per_volume: FloatArray
+    per_volume: FloatArray = sized("tetrahedra")
     """1 / (6 V) of each tetrahedron at rest [1/m3], shape (tetrahedron capacity,)."""
-    scratch: FloatArray
+    scratch: FloatArray = sized("nodes")
     """For a search and for what they add to w^2 of a node, shape (node capacity,)."""
 
 
@@ -81,24 +80,8 @@ def no_collapse(n_nodes: int, n_tetrahedra: int, modulus: float) -> Collapsing:
         n_tetrahedra: Room for tetrahedra.
         modulus: Young's modulus [Pa]; 0 where tetrahedra do not need this.
     """
-    return Collapsing(
-        modulus=float(modulus),
-        n=0,
-        slack=_UNKNOWN,
-        highest=0.0,
-        listed=np.zeros(n_tetrahedra, np.int64),
-        stiffness=np.zeros(n_tetrahedra),
-        limit=np.zeros(n_tetrahedra),
-        per_volume=np.zeros(n_tetrahedra),
-        scratch=np.zeros(n_nodes),
-    )
-
-
-def grown_collapse(collapsing: Collapsing, n_nodes: int, n_tetrahedra: int) -> Collapsing:
-    """Return the same tetrahedra with room for that many nodes and tetrahedra."""
-    of_tetrahedra = ("listed", "stiffness", "limit", "per_volume")
-    larger = {name: grown(getattr(collapsing, name), n_tetrahedra) for name in of_tetrahedra}
-    return collapsing.replaced(scratch=np.zeros(n_nodes), **larger)
+    sizes = {"nodes": n_nodes, "tetrahedra": n_tetrahedra}
+    return Collapsing.new(sizes, modulus=float(modulus), slack=_UNKNOWN)
 
 
 class _Shape(NamedTuple):

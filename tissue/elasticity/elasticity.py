@@ -6,7 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
-from tissue.elasticity.collapse import grown_collapse, no_collapse, renew_collapsing
+from tissue.elasticity.collapse import no_collapse, renew_collapsing
 from tissue.elasticity.finite_elements import (
     build_stars,
     build_tetrahedra,
@@ -22,7 +22,7 @@ from tissue.elasticity.mass_scaling import (
     no_mass_scaling,
 )
 from tissue.elasticity.relaxed_stress import inherit_relaxed
-from tissue.elasticity.springs import build_rows, grown_springs, no_springs
+from tissue.elasticity.springs import build_rows, no_springs
 from tissue.laws.energy_density import volume_term
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
@@ -152,10 +152,10 @@ class Elasticity:
         frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
         collapsing = arrays.collapsing
         if self._may_collapse:
-            collapsing = grown_collapse(collapsing, n_nodes, n_tetrahedra)
+            collapsing = collapsing.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
         self.arrays = arrays.replaced(
             collapsing=collapsing,
-            springs=grown_springs(arrays.springs, n_nodes, len(arrays.springs.neighbour)),
+            springs=arrays.springs.grown({"nodes": n_nodes, "pool": len(arrays.springs.neighbour)}),
             solid=solid,
             frequency_squared=frequencies,
         )
@@ -180,7 +180,9 @@ class Elasticity:
             left = left[_BUILD_ROWS.call(*rows) :]
             if not len(left):
                 return
-            larger = grown_springs(springs, len(springs.first), 2 * len(springs.neighbour))
+            larger = springs.grown(
+                {"nodes": len(springs.first), "pool": 2 * len(springs.neighbour)}
+            )
             self.arrays = self.arrays.replaced(springs=larger)
 
     def _write_stars(self, body: Body, visits: Visits, nodes: IntArray) -> None:

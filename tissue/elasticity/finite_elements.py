@@ -18,8 +18,9 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, aligned, filled
+from tissue.core.simd import WIDTH, filled
 from tissue.core.simd_blocks import row_of_lane, width_of
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
 from tissue.geometry.tetrahedron import tetrahedron_volume
@@ -46,101 +47,101 @@ class Solid(Arrays, two_precisions=True):
 
     law: EnergyDensity
     """The law of the tetrahedra."""
-    nodes: SlotArray
+    nodes: SlotArray = sized((4, "in_blocks"), is_for_vectors=True)
     """Nodes of each tetrahedron, in blocks of four rows (`node_place`)."""
-    shape: FloatArray
+    shape: FloatArray = sized((N_SHAPE, "in_blocks"), is_for_vectors=True)
     """grad N_1, grad N_2, grad N_3 [1/m] and V [m3] of each tetrahedron, in blocks of ten rows
     (`shape_place`). Its precision is that of all scratch but the node's own."""
     relaxing_shares: FloatArray
     """g of each term of the Prony series, shape (terms,); empty where no stress relaxes."""
     relaxation_times: FloatArray
     """tau of each term [s], shape (terms,)."""
-    relaxation_weights: FloatArray
+    relaxation_weights: FloatArray = sized("terms")
     """Scratch of `viscoelasticity`: how far each term goes to its limit in a step, shape
     (terms,)."""
-    relaxed: FloatArray
+    relaxed: FloatArray = sized((N_RELAXED, "relaxing"), is_for_vectors=True)
     """Stress that has relaxed in each tetrahedron [Pa], the sum of all terms, in blocks of seven
     rows; empty where no stress relaxes."""
-    relaxed_terms: FloatArray
+    relaxed_terms: FloatArray = sized((N_RELAXED, "relaxing_terms"), is_for_vectors=True)
     """The same of each term, in blocks of seven rows for each term."""
-    first: IntArray
+    first: IntArray = sized("nodes")
     """Where each node's row begins in the pool, shape (nodes,)."""
-    room: IntArray
+    room: IntArray = sized("nodes")
     """Slots reserved for each node's row, shape (nodes,)."""
-    count: IntArray
+    count: IntArray = sized("nodes")
     """Tetrahedra around each node, shape (nodes,). Its row is padded to a multiple of eight slots
     with places that always hold 0."""
-    around: SlotArray
+    around: SlotArray = sized("pool")
     """Place in `dilated` of the tetrahedron of each slot, in order of tetrahedra; shape (pool,)."""
-    corner: SlotArray
+    corner: SlotArray = sized("pool")
     """Row of `forces` with the force on the corner of each slot, shape (pool,)."""
-    node_volume: FloatArray
+    node_volume: FloatArray = sized("nodes")
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
-    weight: FloatArray
+    weight: FloatArray = sized("nodes")
     """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency.at_rest`), shape
     (nodes,)."""
-    dilatation: FloatArray
+    dilatation: FloatArray = sized("nodes")
     """Term of the averaged volume of each node in that bound [N/m3/kg^0.5], shape (nodes,)."""
-    frequency_squared: FloatArray
+    frequency_squared: FloatArray = sized("nodes")
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
-    ring: FloatArray
+    ring: FloatArray = sized(LARGEST_RING, 3)
     """Scratch of `frequency.at_rest`: sums at the nodes of a star, shape (LARGEST_RING, 3)."""
-    ring_nodes: IntArray
+    ring_nodes: IntArray = sized(LARGEST_RING)
     """Scratch of `frequency.at_rest`: the nodes of a star, shape (LARGEST_RING,)."""
-    listed: IntArray
+    listed: IntArray = sized("nodes")
     """Nodes whose bound was written by the last call of `frequency.at_rest`, shape (nodes,)."""
-    raised: IntArray
+    raised: IntArray = sized("nodes")
     """Scratch of `frequency.at_rest`: nodes given a larger weight, shape (nodes,)."""
     used: IntCell
     """Number of slots of the pool in use."""
     every: IntArray
     """The list 0, 1, 2 ... of all blocks, of all nodes, or of all tetrahedra."""
-    displacement: FloatArray
+    displacement: FloatArray = sized("nodes", 4, is_for_vectors=True)
     """Scratch: displacements of the nodes [m], shape (nodes, 4), the last column 0."""
-    gradient: FloatArray
+    gradient: FloatArray = sized((9, "in_blocks_of_singles"), is_for_vectors=True)
     """Scratch, in single precision: H of each tetrahedron, in blocks of nine rows, xx, xy, xz and
     so on."""
-    dilated: FloatArray
+    dilated: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch: V (J - 1) of tetrahedron t [m3], behind a first block of zeros."""
-    growth: FloatArray
+    growth: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch of `frequency.quick` and of energies: growth of the faces of tetrahedron t,
     behind a first block."""
-    tested_growth: FloatArray
+    tested_growth: FloatArray = sized("behind_a_block", fill=1.0, is_for_vectors=True)
     """Growth of the faces of tetrahedron t when the bound was last evaluated at its nodes, behind a
     first block (`frequency.strained`); 1 where it was not."""
-    tested_bound: FloatArray
+    tested_bound: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Bound on w^2 at the nodes of tetrahedron t that was found then [1/s2], behind a first
     block; 0 where it was not evaluated."""
-    inverse_bound: FloatArray
+    inverse_bound: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """One over the highest bound on w^2 at rest at the nodes of tetrahedron t [s2], behind a first
     block. Where a node has got mass since, it is smaller than that."""
-    shear_share: FloatArray
+    shear_share: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Share of that bound that the shear part of the law alone would have [1]."""
-    strained_bound: FloatArray
+    strained_bound: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch of `frequency.quick`: a quick bound on w^2 of tetrahedron t [1/s2], behind a first
     block."""
-    fast_blocks: IntArray
+    fast_blocks: IntArray = sized("blocks")
     """Scratch of `frequency.quick`: blocks with a tetrahedron that may be too fast."""
-    stiffening: FloatArray
+    stiffening: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch of `frequency.quick`, under laws that stiffen: shear modulus of tetrahedron t over
     that at rest, behind a first block (`tissue.laws.kernels`)."""
-    stiffening_slope: FloatArray
+    stiffening_slope: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch of `frequency.quick`, under laws that stiffen: how fast that rises."""
-    stiffness: FloatArray
+    stiffness: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch of `frequency.quick`, under laws that stiffen: a bound on the stiffness of the
     shear part over that at rest."""
-    tested_stiffness: FloatArray
+    tested_stiffness: FloatArray = sized("behind_a_block", fill=1.0, is_for_vectors=True)
     """`stiffness` at the test of `tested_growth`."""
-    shear_frequency_squared: FloatArray
+    shear_frequency_squared: FloatArray = sized("nodes")
     """The part of `frequency_squared` that the shear part of the law alone would have [1/s2],
     under laws that stiffen; shape (nodes,)."""
-    strained_dilatation: FloatArray
+    strained_dilatation: FloatArray = sized("nodes")
     """Scratch of `frequency.strained`: `dilatation` as the body is deformed, shape (nodes,)."""
-    strained_frequency_squared: FloatArray
+    strained_frequency_squared: FloatArray = sized("nodes")
     """Scratch of `frequency.strained`: `frequency_squared` as it is deformed, shape (nodes,)."""
-    dilatation_test: IntArray
+    dilatation_test: IntArray = sized("nodes")
     """Test in which `strained_dilatation` was written, shape (nodes,)."""
-    frequency_test: IntArray
+    frequency_test: IntArray = sized("nodes")
     """Test in which `strained_frequency_squared` was written, shape (nodes,)."""
     test: IntCell
     """Number of the test of strained frequencies."""
@@ -150,10 +151,10 @@ class Solid(Arrays, two_precisions=True):
     """1 where no tetrahedron has changed since `strained_frequency` was run for the next step."""
     fastest: IntCell
     """Tetrahedron that set the number of steps in the last test, or -1 where none did."""
-    pressure: FloatArray
+    pressure: FloatArray = sized("nodes", 4, is_for_vectors=True)
     """Scratch: lam (J - 1) of each node [Pa], tension is positive, four times in a row
     (`values_of_rows`); shape (nodes, 4)."""
-    forces: FloatArray
+    forces: FloatArray = sized((16, "behind_a_block"), 4, is_for_vectors=True)
     """Scratch: force on each corner of each tetrahedron [N], as rows x, y, z, z, shape (rows, 4):
     a block of rows that are 0, then for each block its corners 0, 1, 2 and 3 (`corner_row`)."""
 
@@ -178,79 +179,43 @@ def no_solid(
         is_single: Whether forces are computed in single precision.
     """
     real = np.float32 if is_single else np.float64
-    width = 2 * WIDTH if is_single else WIDTH
-    blocks = (n_tetrahedra + width - 1) // width
-    room = width * (1 + blocks)
-    tested_growth = aligned(room, real)
-    tested_growth[:] = 1.0
-    tested_stiffness = aligned(room, real)
-    tested_stiffness[:] = 1.0
     terms = np.array(prony, dtype=np.float64).reshape(-1, 2)
-    return Solid(
+    return Solid.new(
+        _sizes(n_nodes, n_tetrahedra, pool, len(terms), is_single),
+        real=real,
         law=law,
-        nodes=aligned(4 * width * blocks, np.int32),
-        shape=aligned(N_SHAPE * width * blocks, real),
         relaxing_shares=terms[:, 0].copy(),
         relaxation_times=terms[:, 1].copy(),
-        relaxation_weights=np.zeros(len(terms)),
-        relaxed=aligned(N_RELAXED * width * blocks if len(terms) else 0, real),
-        relaxed_terms=aligned(N_RELAXED * width * blocks * len(terms), real),
-        first=np.zeros(n_nodes, dtype=np.int64),
-        room=np.zeros(n_nodes, dtype=np.int64),
-        count=np.zeros(n_nodes, dtype=np.int64),
-        around=np.zeros(pool, dtype=np.int32),
-        corner=np.zeros(pool, dtype=np.int32),
-        node_volume=np.zeros(n_nodes),
-        weight=np.zeros(n_nodes),
-        dilatation=np.zeros(n_nodes),
-        frequency_squared=np.zeros(n_nodes),
-        ring=np.zeros((LARGEST_RING, 3)),
-        ring_nodes=np.zeros(LARGEST_RING, dtype=np.int64),
-        listed=np.zeros(n_nodes, dtype=np.int64),
-        raised=np.zeros(n_nodes, dtype=np.int64),
-        used=0,
         every=np.arange(max(n_nodes, n_tetrahedra)),
-        displacement=aligned(4 * n_nodes, real).reshape(-1, 4),
-        gradient=aligned(9 * width * blocks if is_single else 0, real),
-        dilated=aligned(room, real),
-        growth=aligned(room, real),
-        tested_growth=tested_growth,
-        tested_bound=aligned(room, real),
-        inverse_bound=aligned(room, real),
-        shear_share=aligned(room, real),
-        strained_bound=aligned(room, real),
-        fast_blocks=np.zeros(blocks, dtype=np.int64),
-        stiffening=aligned(room, real),
-        stiffening_slope=aligned(room, real),
-        stiffness=aligned(room, real),
-        tested_stiffness=tested_stiffness,
-        shear_frequency_squared=np.zeros(n_nodes),
-        strained_dilatation=np.zeros(n_nodes),
-        strained_frequency_squared=np.zeros(n_nodes),
-        dilatation_test=np.zeros(n_nodes, dtype=np.int64),
-        frequency_test=np.zeros(n_nodes, dtype=np.int64),
-        test=0,
-        are_gradients_known=0,
-        is_bound_current=0,
         fastest=-1,
-        pressure=aligned(4 * n_nodes, real).reshape(-1, 4),
-        forces=aligned(4 * 4 * room, real).reshape(-1, 4),
     )
+
+
+def _sizes(
+    n_nodes: int, n_tetrahedra: int, pool: int, n_terms: int, is_single: bool
+) -> dict[str, int]:
+    """Return the sizes of the arrays of `Solid` for that much."""
+    width = 2 * WIDTH if is_single else WIDTH
+    blocks = (n_tetrahedra + width - 1) // width
+    return {
+        "nodes": n_nodes,
+        "pool": pool,
+        "terms": n_terms,
+        "blocks": blocks,
+        "in_blocks": width * blocks,
+        "in_blocks_of_singles": width * blocks if is_single else 0,
+        "relaxing": width * blocks if n_terms else 0,
+        "relaxing_terms": width * blocks * n_terms,
+        "behind_a_block": width * (1 + blocks),
+    }
 
 
 def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     is_single = solid.shape.dtype == np.float32
-    prony = list(zip(solid.relaxing_shares, solid.relaxation_times, strict=True))
-    room = (n_nodes, n_tetrahedra, pool)
-    larger = no_solid(solid.law, *room, prony=prony, is_single=is_single)
-    cells = {"used", "test", "are_gradients_known", "is_bound_current", "fastest"}
-    for name in cells:
-        setattr(larger, name, getattr(solid, name))
-    for name in set(Solid.__annotations__) - cells - {"law", "every"}:
-        old = getattr(solid, name)
-        getattr(larger, name)[: len(old)] = old
-    return larger
+    n_terms = len(solid.relaxation_times)
+    larger = solid.grown(_sizes(n_nodes, n_tetrahedra, pool, n_terms, is_single))
+    return larger.replaced(every=np.arange(max(n_nodes, n_tetrahedra)))
 
 
 def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:

@@ -47,9 +47,7 @@ class MassScaling(Arrays):
 
 def no_mass_scaling() -> MassScaling:
     """Return that no node gets mass."""
-    return MassScaling(
-        allowed=np.inf, allowed_between_cuts=np.inf, added=0.0, largest=0.0, most=0.0, lost=0.0
-    )
+    return MassScaling.new({}, allowed=np.inf, allowed_between_cuts=np.inf)
 
 
 @kernel

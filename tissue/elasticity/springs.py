@@ -10,8 +10,6 @@ Stiffness of an edge (van Gelder): k = E * (volume of the tetrahedra around it) 
 Pull of a spring on its ends: k (l - l0). Dampers along the edges have the stiffness of springs.
 """
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import (
@@ -25,6 +23,7 @@ from tissue.core.simd import (
     summed,
     times,
 )
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import norm, sub, vec3
 from tissue.geometry.tetrahedron import (
@@ -33,7 +32,7 @@ from tissue.geometry.tetrahedron import (
     nothing_symmetric,
     tetrahedron_volume,
 )
-from tissue.mesh.body import Body, grown
+from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
 
 NO_LENGTH = 1e-300
@@ -47,22 +46,22 @@ SPRING_POOL_MARGIN = LARGEST_STAR + WIDTH
 class Springs(Arrays):
     """Rows of springs in one pool, and bounds on the frequency of each node."""
 
-    first: IntArray
+    first: IntArray = sized("nodes")
     """Where each node's row begins in the pool, shape (capacity,)."""
-    room: IntArray
+    room: IntArray = sized("nodes")
     """Slots reserved for each node's row, shape (capacity,)."""
-    count: IntArray
+    count: IntArray = sized("nodes")
     """Slots that each node's row uses, shape (capacity,)."""
-    neighbour: SlotArray
+    neighbour: SlotArray = sized("pool")
     """Other end of each spring, shape (pool,)."""
-    stiffness: FloatArray
+    stiffness: FloatArray = sized("pool")
     """Stiffness k of each spring [N/m], shape (pool,)."""
-    rest_pull: FloatArray
+    rest_pull: FloatArray = sized("pool")
     """Stiffness times rest length of each spring [N], shape (pool,)."""
-    stiffness_per_mass: FloatArray
+    stiffness_per_mass: FloatArray = sized("nodes")
     """Largest eigenvalue of the stiffness of all springs at each node, per mass [1/s2], shape
     (capacity,)."""
-    frequency_squared: FloatArray
+    frequency_squared: FloatArray = sized("nodes")
     """Bound on the square of the local angular frequency [1/s2], shape (capacity,)."""
     used: IntCell
     """Number of slots of the pool in use."""
@@ -70,26 +69,7 @@ class Springs(Arrays):
 
 def no_springs(n_nodes: int, pool: int) -> Springs:
     """Return empty rows for that many nodes."""
-    return Springs(
-        first=np.zeros(n_nodes, dtype=np.int64),
-        room=np.zeros(n_nodes, dtype=np.int64),
-        count=np.zeros(n_nodes, dtype=np.int64),
-        neighbour=np.zeros(pool, dtype=np.int32),
-        stiffness=np.zeros(pool),
-        rest_pull=np.zeros(pool),
-        stiffness_per_mass=np.zeros(n_nodes),
-        frequency_squared=np.zeros(n_nodes),
-        used=0,
-    )
-
-
-def grown_springs(springs: Springs, n_nodes: int, pool: int) -> Springs:
-    """Return the rows with room for that many nodes and springs."""
-    of_nodes = ("first", "room", "count", "stiffness_per_mass", "frequency_squared")
-    larger = {name: grown(getattr(springs, name), n_nodes) for name in of_nodes}
-    of_pool = ("neighbour", "stiffness", "rest_pull")
-    larger |= {name: grown(getattr(springs, name), pool) for name in of_pool}
-    return springs.replaced(**larger)
+    return Springs.new({"nodes": n_nodes, "pool": pool})
 
 
 @kernel

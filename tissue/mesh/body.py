@@ -13,6 +13,7 @@ import numpy as np
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import room_for_points
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import Lattice, lattice_around
@@ -35,31 +36,31 @@ LONGEST_WALK = 128
 class Body(Arrays):
     """Every node and tetrahedron. Rows beyond `n_nodes` and `n_tetrahedra` are room to grow."""
 
-    rest: FloatArray
+    rest: FloatArray = sized("nodes", 3)
     """Rest positions [m], shape (capacity, 3)."""
-    lattice_rest: IntArray
+    lattice_rest: IntArray = sized("nodes", 3)
     """Rest positions on the lattice, shape (capacity, 3)."""
-    positions: FloatArray
+    positions: FloatArray = sized("nodes", 3)
     """Positions now [m], shape (capacity, 3)."""
-    velocities: FloatArray
+    velocities: FloatArray = sized("nodes", 3)
     """Velocities [m/s], shape (capacity, 3)."""
-    masses: FloatArray
+    masses: FloatArray = sized("nodes")
     """Masses that are moved [kg]: a quarter of each tetrahedron around the node, and what mass
     scaling added. Shape (capacity,)."""
-    added_masses: FloatArray
+    added_masses: FloatArray = sized("nodes")
     """The part of the masses that mass scaling added [kg]: it has no weight. Shape (capacity,)."""
-    fixed: BoolArray
+    fixed: BoolArray = sized("nodes")
     """Whether each node is fixed, shape (capacity,)."""
-    off_path: FloatArray
+    off_path: FloatArray = sized("nodes")
     """Distance of a cut's node from where the blade passed [m], the largest of several cuts; 0 for
     other nodes, -1 where no blade passed but a bridge was finished; shape (capacity,)."""
-    node_tetrahedron: IntArray
+    node_tetrahedron: IntArray = sized("nodes")
     """One tetrahedron around each node; links lead to the others. Shape (capacity,)."""
-    twin: IntArray
+    twin: IntArray = sized("nodes")
     """Next node in the ring of nodes that were one before cuts doubled it, shape (capacity,)."""
-    tetrahedra: IntArray
+    tetrahedra: IntArray = sized("tetrahedra", 4)
     """Node indices, shape (capacity, 4)."""
-    links: IntArray
+    links: IntArray = sized("tetrahedra", 4)
     """Half-face behind each face, shape (capacity, 4)."""
     n_nodes: IntCell
     """Number of nodes."""
@@ -103,15 +104,12 @@ def build_body(
     lattice = lattice_around(rest)
     node_tetrahedron = np.zeros(n, dtype=np.int64)
     node_tetrahedron[tetrahedra[::-1]] = np.arange(len(tetrahedra))[::-1, None]
-    return Body(
+    return Body.new(
+        {"nodes": n},
         rest=grown(rest, n),
         lattice_rest=np.floor((rest - lattice.origin) / lattice.spacing + 0.5).astype(np.int64),
         positions=grown(rest if positions is None else positions, n),
-        velocities=room_for_points(n),
-        masses=np.zeros(n),
-        added_masses=np.zeros(n),
         fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
-        off_path=np.zeros(n),
         node_tetrahedron=node_tetrahedron,
         twin=np.arange(n),
         tetrahedra=tetrahedra.copy(),
@@ -136,18 +134,9 @@ def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
 
 def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
     """Return the body with room for that many nodes and tetrahedra."""
-    of_tetrahedra = ("tetrahedra", "links")
-    of_nodes = set(Body.__annotations__) - {
-        *of_tetrahedra,
-        "n_nodes",
-        "n_tetrahedra",
-        "lattice",
-        "hanging",
-    }
-    larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
-    larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in of_tetrahedra}
     hanging = grown_hanging(body.hanging, n_nodes, n_tetrahedra)
-    return body.replaced(**larger, hanging=hanging)
+    larger = body.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
+    return larger.replaced(hanging=hanging)
 
 
 @kernel

@@ -2,10 +2,9 @@
 
 from typing import Final, NamedTuple, Protocol
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -34,13 +33,13 @@ ROOM_FOR_TETRAHEDRA = 1 << 12
 class Change(Arrays):
     """Changes of one pass of a cut step."""
 
-    flagged: IntArray
+    flagged: IntArray = sized("lists")
     """Nodes that came to lie on the cut surface, shape (room,)."""
-    dirty: IntArray
+    dirty: IntArray = sized("lists")
     """Tetrahedra that were split or got another node, with repeats; shape (room,)."""
-    faces: IntArray
+    faces: IntArray = sized("lists", 4)
     """Faces cut, each as tetrahedron, local face, tetrahedron, local face; shape (room, 4)."""
-    children: IntArray
+    children: IntArray = sized("lists", 2)
     """Tetrahedra that were appended, and the tetrahedron that each is a part of: in order, so that
     a parent stands before its children; shape (room, 2)."""
     n_flagged: IntCell
@@ -56,7 +55,7 @@ class Change(Arrays):
     lacks_room: IntCell
     """LISTS or NODES where there was no room, and something is missing; else 0. What was done is of
     no use then: it is done again from where the step began, with more room."""
-    lost_spin: FloatArray
+    lost_spin: FloatArray = sized(3)
     """Angular momentum that the masses at nodes lost by splits, over the density [m5/s], shape
     (3,)."""
     area: FloatCell
@@ -96,33 +95,13 @@ class Owner(Protocol):
 
 def new_change() -> Change:
     """Return an empty list of changes."""
-    return Change(
-        **_lists(CHANGES),
-        n_flagged=0,
-        n_dirty=0,
-        n_faces=0,
-        n_children=0,
-        is_full=0,
-        lacks_room=0,
-        lost_spin=np.zeros(3),
-        area=0.0,
-        finished_area=0.0,
-    )
+    return Change.new({"lists": CHANGES})
 
 
 def with_twice_the_room(change: Change) -> Change:
     """Return an empty list of changes with twice the room, and the same sums."""
-    empty = {name: 0 for name in ("n_flagged", "n_dirty", "n_faces", "n_children", "is_full")}
-    return change.replaced(**_lists(2 * len(change.dirty)), **empty, lacks_room=0)
-
-
-def _lists(room: int) -> dict[str, IntArray]:
-    return {
-        "flagged": np.zeros(room, np.int64),
-        "dirty": np.zeros(room, np.int64),
-        "faces": np.zeros((room, 4), np.int64),
-        "children": np.zeros((room, 2), np.int64),
-    }
+    sums = {name: getattr(change, name) for name in ("lost_spin", "area", "finished_area")}
+    return Change.new({"lists": 2 * len(change.dirty)}, **sums)
 
 
 @kernel

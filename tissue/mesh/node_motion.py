@@ -2,24 +2,23 @@
 
 import math
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes
 from tissue.core.simd_blocks import sum_of_lanes
 from tissue.core.simd_rows import rows_of_three
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import vec3
-from tissue.mesh.body import Body, grown
+from tissue.mesh.body import Body
 
 
 class Moved(Arrays):
     """The nodes that have moved, each once."""
 
-    nodes: IntArray
+    nodes: IntArray = sized("nodes")
     """Nodes listed, shape (capacity,)."""
-    seen: IntArray
+    seen: IntArray = sized("nodes")
     """Value of `epoch` when each node was last listed, shape (capacity,)."""
     n_nodes: IntCell
     """Number of nodes listed."""
@@ -29,13 +28,12 @@ class Moved(Arrays):
 
 def none_moved(n_nodes: int) -> Moved:
     """Return an empty list with room for that many nodes."""
-    nodes, seen = np.zeros((2, n_nodes), np.int64)
-    return Moved(nodes=nodes, seen=seen, n_nodes=0, epoch=1)
+    return Moved.new({"nodes": n_nodes}, epoch=1)
 
 
 def grown_moved(moved: Moved, n_nodes: int) -> Moved:
     """Return the list with room for that many nodes."""
-    return moved.replaced(nodes=grown(moved.nodes, n_nodes), seen=grown(moved.seen, n_nodes))
+    return moved.grown({"nodes": n_nodes})
 
 
 @kernel

@@ -12,6 +12,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays
 
 HANGING = -3
@@ -27,30 +28,23 @@ _END = -1
 class Hanging(Arrays):
     """Faces of two sizes that meet, and the tetrahedra around each node. May be empty."""
 
-    faces: IntArray
+    faces: IntArray = sized("faces", 1 + SMALL_FACES, fill=-1)
     """The tetrahedron with the large face, then those with the small ones; shape (n_rows, 7)."""
-    first: IntArray
+    first: IntArray = sized("nodes", fill=_END)
     """First entry of each node's list: 4 * tetrahedron + local node; shape (node capacity,)."""
-    next: IntArray
+    next: IntArray = sized((4, "tetrahedra"), fill=_END)
     """Next entry of the list, by entry; shape (4 * tetrahedron capacity,)."""
 
 
 def nothing_hanging() -> Hanging:
     """Return empty arrays, for a scheme with which no node hangs."""
-    return Hanging(
-        faces=np.zeros((0, 1 + SMALL_FACES), np.int64),
-        first=np.zeros(0, np.int64),
-        next=np.zeros(0, np.int64),
-    )
+    return Hanging.new({"faces": 0, "nodes": 0, "tetrahedra": 0})
 
 
 def may_hang(n_faces: int, n_nodes: int, tetrahedra: IntArray) -> Hanging:
     """Return room for that many faces, and the lists of `tetrahedra`, shape (n_tets, 4)."""
-    hanging = Hanging(
-        faces=np.full((n_faces, 1 + SMALL_FACES), -1),
-        first=np.full(n_nodes, _END),
-        next=np.full(tetrahedra.size, _END),
-    )
+    sizes = {"faces": n_faces, "nodes": n_nodes, "tetrahedra": len(tetrahedra)}
+    hanging = Hanging.new(sizes)
     list_corners(hanging, np.ascontiguousarray(tetrahedra))
     return hanging
 
@@ -59,10 +53,7 @@ def grown_hanging(hanging: Hanging, n_nodes: int, n_tetrahedra: int) -> Hanging:
     """Return the arrays with room for that many nodes and tetrahedra; empty ones stay empty."""
     if len(hanging.first) == 0:
         return hanging
-    first, following = np.full(n_nodes, _END), np.full(4 * n_tetrahedra, _END)
-    first[: len(hanging.first)] = hanging.first
-    following[: len(hanging.next)] = hanging.next
-    return hanging.replaced(first=first, next=following)
+    return hanging.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
 
 
 @kernel

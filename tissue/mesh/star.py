@@ -4,6 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.geometry.tetrahedron import node_altitude
 from tissue.mesh.body import Body, local_index
@@ -20,23 +21,17 @@ class Visits(Arrays):
     """Number of the current search."""
     is_full: IntCell
     """1 if there were more than `LARGEST_STAR` tetrahedra around a node, else 0."""
-    tetrahedra: IntArray
+    tetrahedra: IntArray = sized("tetrahedra")
     """Search that visited each tetrahedron last, shape (capacity,)."""
-    nodes: IntArray
+    nodes: IntArray = sized("nodes")
     """Search that visited each node last, shape (capacity,)."""
-    place: IntArray
+    place: IntArray = sized("nodes")
     """Index of each node in a list of that search, shape (capacity,)."""
 
 
 def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
     """Return visits for that many nodes and tetrahedra."""
-    return Visits(
-        epoch=0,
-        is_full=0,
-        tetrahedra=np.zeros(n_tetrahedra, np.int64),
-        nodes=np.zeros(n_nodes, np.int64),
-        place=np.zeros(n_nodes, np.int64),
-    )
+    return Visits.new({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
 
 
 @kernel

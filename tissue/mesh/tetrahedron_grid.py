@@ -12,8 +12,9 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, aligned
+from tissue.core.simd import WIDTH
 from tissue.core.simd_rows import larger_bits, rows_of_three
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import vec3
 from tissue.geometry.aabb import tetrahedron_box, widened
@@ -58,7 +59,7 @@ class TetrahedronGrid(Arrays):
     head: IntArray
     """First line of each cell's list, -1 if it is empty, and how many tetrahedra are in it; shape
     (n_cells, 2)."""
-    lines: SlotArray
+    lines: SlotArray = sized("lines", 1 + TETRAHEDRA_PER_LINE, is_for_vectors=True)
     """The next line of the same list, -1 at its end, and tetrahedra. Lines behind the first one of
     a list are full. Shape (room, 1 + TETRAHEDRA_PER_LINE)."""
     n_lines: IntCell
@@ -68,14 +69,14 @@ class TetrahedronGrid(Arrays):
     n_logged: IntCell
     """Number of tetrahedra listed in other cells than before since `log` was read; there may be
     more than `log` has room for."""
-    log: SlotArray
+    log: SlotArray = sized(LOGGED)
     """These tetrahedra, shape (LOGGED,)."""
-    cells: SlotArray
+    cells: SlotArray = sized("tetrahedra", 6)
     """First cell along each axis in which each tetrahedron was listed last, then the last one;
     shape (tetrahedron capacity, 6). The last is before the first where it was not listed yet."""
-    low: FloatArray
+    low: FloatArray = sized("nodes", 3, fill=np.inf)
     """Lowest corner of the box that each node may move in [m], shape (node capacity, 3)."""
-    high: FloatArray
+    high: FloatArray = sized("nodes", 3, fill=-np.inf)
     """Highest corner [m], shape (node capacity, 3); below the lowest one for new nodes."""
     margin: float
     """Distance by which the boxes of tetrahedra are widened [m]."""
@@ -96,24 +97,16 @@ def _empty_grid(
 ) -> TetrahedronGrid:
     """Return a grid that lists nothing yet, for that many nodes and tetrahedra."""
     n_nodes, n_tetrahedra = capacity
-    cells = np.zeros((n_tetrahedra, 6), np.int32)
-    cells[:, 3:] = -1
-    per_line = 1 + TETRAHEDRA_PER_LINE
-    return TetrahedronGrid(
+    grid = TetrahedronGrid.new(
+        {"nodes": n_nodes, "tetrahedra": n_tetrahedra, "lines": n_lines},
         origin=origin,
         spacing=spacing,
         shape=shape,
         head=np.tile([-1, TETRAHEDRA_PER_LINE], (int(shape.prod()), 1)),
-        lines=aligned(n_lines * per_line, np.int32).reshape(n_lines, per_line),
-        n_lines=0,
-        n_listed=0,
-        n_logged=0,
-        log=np.zeros(LOGGED, np.int32),
-        cells=cells,
-        low=np.full((n_nodes, 3), np.inf),
-        high=np.full((n_nodes, 3), -np.inf),
         margin=margin,
     )
+    grid.cells[:, 3:] = -1
+    return grid
 
 
 def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronGrid:

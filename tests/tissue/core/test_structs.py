@@ -5,6 +5,7 @@ import pytest
 
 from tissue import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell, Vectors
 from tissue.core.vec3 import Vec3
 
@@ -169,3 +170,23 @@ def test_numbers_that_do_not_fit_a_struct_of_vectors_are_refused():
     for numbers in ((1.0,) * 5, (1.0,) * 5 + ("one",)):
         with pytest.raises(TypeError):
             Frame.of_numbers(numbers)
+
+
+class Rows(Arrays):
+    points: FloatArray = sized("rows", 3)
+    first: IntArray = sized("rows", fill=-1)
+    shape: FloatArray = sized((4, "blocks"), is_for_vectors=True)
+    n: IntCell
+    weight: float
+
+
+def test_a_struct_is_made_from_the_sizes_of_its_arrays_and_grows_by_them():
+    rows = Rows.new({"rows": 2, "blocks": 8}, real=np.float32, weight=0.5)
+    assert (rows.n, rows.weight, rows.first.tolist()) == (0, 0.5, [-1, -1])
+    assert (rows.points.dtype, rows.shape.dtype) == (np.float64, np.float32)
+    assert rows.shape.shape == (32,) and rows.shape.ctypes.data % 64 == 0
+    rows.n, rows.points[1, 2] = 1, 7.0
+    larger = rows.grown({"rows": 3})
+    assert (larger.n, larger.first.tolist()) == (1, [-1, -1, -1])
+    assert larger.points.shape == (3, 3) and larger.points[1, 2] == larger.points.sum() == 7.0
+    assert larger.shape is rows.shape

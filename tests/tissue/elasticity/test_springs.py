@@ -16,7 +16,6 @@ from tissue import block
 from tissue.elasticity.springs import (
     SPRING_POOL_MARGIN,
     build_rows,
-    grown_springs,
     no_springs,
     spring_energy,
 )
@@ -156,7 +155,7 @@ def test_too_little_capacity_for_a_row_is_reported_and_nothing_is_lost():
     too_small = no_springs(n, SPRING_POOL_MARGIN + 20)
     done = build_rows(body, visits, too_small, np.arange(n), n, *arguments)
     assert 0 < done < n
-    larger = grown_springs(too_small, n, 4 * SPRING_POOL_MARGIN)
+    larger = too_small.grown({"nodes": n, "pool": 4 * SPRING_POOL_MARGIN})
     rest = np.arange(done, n)
     assert build_rows(body, visits, larger, rest, n - done, *arguments) == n - done
     expected = springs_of(build_body(mesh, None, None))

@@ -8,6 +8,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.cutting.bielser_1998.case_table import LOOKUP
 from tissue.cutting.bielser_1998.template_1_to_17 import EDGES, FACES, PRESPLIT, bit_of
@@ -30,7 +31,7 @@ class Records(Arrays):
     """Nodes A, B, C, D of each tetrahedron, shape (n_tets, 4)."""
     links: IntArray
     """Half-faces behind each face, as `Body.links` before the first cut; shape (n_tets, 4)."""
-    first_child: IntArray
+    first_child: IntArray = sized("tetrahedra", fill=WHOLE_STILL)
     """First appended child, or WHOLE_STILL; child 0 replaces its parent; shape (n_tets,)."""
     edges_of: IntArray
     """The edges AB BC BD AC CD AD of each tetrahedron, shape (n_tets, 6)."""
@@ -42,23 +43,23 @@ class Records(Arrays):
     """First edge whose lower end is each node, shape (n_nodes + 1,)."""
     faces: IntArray
     """Corners of each face, ascending, shape (n_faces, 3)."""
-    crossed_at: FloatArray
+    crossed_at: FloatArray = sized("edges", fill=NOT_CUT)
     """Fraction from its first end at which the blade crossed each edge, or NOT_CUT; (n_edges,)."""
-    crossed_in: IntArray
+    crossed_in: IntArray = sized("edges")
     """Incision in which the blade crossed each edge, shape (n_edges,)."""
     incision: IntCell
     """Number of the current incision, from 1."""
-    edge_nodes: IntArray
+    edge_nodes: IntArray = sized("edges", 2, fill=NO_NODE)
     """The references to each edge's node, one for each end, or NO_NODE; shape (n_edges, 2)."""
-    edge_held: IntArray
+    edge_held: IntArray = sized("edges")
     """Whether a split tetrahedron holds the edge's node together, shape (n_edges,)."""
-    tip_weights: FloatArray
+    tip_weights: FloatArray = sized("faces", 3)
     """Weights of the corners of each face where the tip passed through it, or 0; (n_faces, 3)."""
-    face_weights: FloatArray
+    face_weights: FloatArray = sized("faces", 3)
     """Weights of the corners of each face at its node, shape (n_faces, 3)."""
-    face_nodes: IntArray
+    face_nodes: IntArray = sized("faces", 3, fill=NO_NODE)
     """The references to each face's node, one for each corner, or NO_NODE; shape (n_faces, 3)."""
-    face_held: IntArray
+    face_held: IntArray = sized("faces")
     """Whether a split tetrahedron holds the face's node together, shape (n_faces,)."""
 
 
@@ -100,24 +101,17 @@ def records_of(body: Body) -> Records:
     faces = np.sort(tetrahedra[first[:, None] // 4, np.array(FACES)[first % 4]], axis=1)
     faces_of = np.empty(4 * n_tetrahedra, dtype=np.int64)
     faces_of[sorting.halves] = np.repeat(np.arange(len(faces)), sorting.counts)
-    return Records(
+    sizes = {"tetrahedra": n_tetrahedra, "edges": len(edges), "faces": len(faces)}
+    return Records.new(
+        sizes,
         tetrahedra=tetrahedra,
         links=body.links[:n_tetrahedra].copy(),
-        first_child=np.full(n_tetrahedra, WHOLE_STILL),
         edges_of=edges_of.reshape(n_tetrahedra, 6).astype(np.int64),
         faces_of=faces_of.reshape(n_tetrahedra, 4),
         edges=np.ascontiguousarray(edges),
         first_edge=np.searchsorted(edges[:, 0], np.arange(n_nodes + 1)).astype(np.int64),
         faces=np.ascontiguousarray(faces),
-        crossed_at=np.full(len(edges), NOT_CUT),
-        crossed_in=np.zeros(len(edges), np.int64),
         incision=1,
-        edge_nodes=np.full((len(edges), 2), NO_NODE),
-        edge_held=np.zeros(len(edges), np.int64),
-        tip_weights=np.zeros((len(faces), 3)),
-        face_weights=np.zeros((len(faces), 3)),
-        face_nodes=np.full((len(faces), 3), NO_NODE),
-        face_held=np.zeros(len(faces), np.int64),
     )
 
 

@@ -12,10 +12,9 @@ nodes are in one plane in cases B and E, and where the tip passes near an edge i
 towards the centroids (`_guard`).
 """
 
-import numpy as np
-
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3
 from tissue.cutting.bielser_1998.mesh_records import (
@@ -57,24 +56,14 @@ DRAWS = 8
 class Placing(Arrays):
     """Scratch: where the nodes of one tetrahedron are."""
 
-    weights: FloatArray
+    weights: FloatArray = sized(N_LOCAL_NODES, 4)
     """Barycentric weights in the tetrahedron, shape (14, 4)."""
-    wanted: FloatArray
+    wanted: FloatArray = sized(4, 4)
     """Weights that the face nodes would have without the guard, shape (4, 4)."""
-    is_placed: IntArray
+    is_placed: IntArray = sized(4)
     """Whether the neighbour was split before and placed each face's node, shape (4,)."""
-    is_own: IntArray
+    is_own: IntArray = sized(4)
     """Whether the tetrahedron nevertheless needs a node of its own in each face, shape (4,)."""
-
-
-def new_placing() -> Placing:
-    """Return scratch for one tetrahedron."""
-    return Placing(
-        weights=np.zeros((N_LOCAL_NODES, 4)),
-        wanted=np.zeros((4, 4)),
-        is_placed=np.zeros(4, np.int64),
-        is_own=np.zeros(4, np.int64),
-    )
 
 
 @kernel

@@ -9,6 +9,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.cutting.bielser_1998.case_table import CASES
 from tissue.cutting.bielser_1998.mesh_records import (
@@ -24,14 +25,14 @@ from tissue.cutting.bielser_1998.mesh_records import (
     reference_at_face,
     table,
 )
-from tissue.cutting.bielser_1998.node_placement import new_placing
-from tissue.cutting.bielser_1998.subdivision import Split, SplitCounts, no_counts, split_tetrahedron
+from tissue.cutting.bielser_1998.node_placement import Placing
+from tissue.cutting.bielser_1998.subdivision import Split, SplitCounts, split_tetrahedron
 from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN, N_LOCAL_NODES, bit_of
 from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, line_of_sample, next_event
-from tissue.cutting.cut_surface import grown_cut_surface, new_cut_surface
+from tissue.cutting.cut_surface import new_cut_surface
 from tissue.cutting.workspace import (
     Cut,
     SnapLimits,
@@ -57,11 +58,11 @@ GONE = -1.0
 class Waiting(Arrays):
     """Tetrahedra of which the blade has cut an edge and that it has not left yet."""
 
-    tetrahedra: IntArray
+    tetrahedra: IntArray = sized("tetrahedra")
     """The waiting tetrahedra, shape (n_tets,)."""
     n_listed: IntCell
     """Number of tetrahedra in the list."""
-    is_listed: IntArray
+    is_listed: IntArray = sized("tetrahedra")
     """Whether a tetrahedron is in the list, shape (n_tets,)."""
 
 
@@ -83,15 +84,10 @@ class PaperScheme:
         self._reach = _REACH * node_size
         self._records = records_of(body)
         self._table = table()
-        n = len(self._records.tetrahedra)
-        self._waiting = Waiting(
-            tetrahedra=np.zeros(n, np.int64),
-            n_listed=0,
-            is_listed=np.zeros(n, np.int64),
-        )
-        self._placing = new_placing()
+        self._waiting = Waiting.new({"tetrahedra": len(self._records.tetrahedra)})
+        self._placing = Placing.new({})
         self._references = np.zeros((5, N_LOCAL_NODES), np.int64)
-        self._counts = no_counts()
+        self._counts = SplitCounts.new({})
         # For collision detection. The cut surface stays empty: this scheme moves no node to it.
         self._scratch = new_cut_scratch(0)
         self._surface = new_cut_surface(len(body.rest), len(body.tetrahedra))
@@ -150,7 +146,7 @@ class PaperScheme:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._surface = grown_cut_surface(self._surface, n_nodes, n_tetrahedra)
+        self._surface = self._surface.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return counts of what was done so far."""

@@ -1,9 +1,8 @@
 """Split one tetrahedron in seventeen, and open it along the triangles of its case (section 4.2)."""
 
-import numpy as np
-
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, axpy, store, sub, vec3
 from tissue.cutting.bielser_1998.case_table import CASES
@@ -38,7 +37,7 @@ MOST_NEW_NODES = 20
 class SplitCounts(Arrays):
     """Counts of what the scheme did since the body was made."""
 
-    n_of_case: IntArray
+    n_of_case: IntArray = sized(len(CASES))
     """Split tetrahedra of each case, A to E; shape (5,)."""
     n_guarded: IntCell
     """Split tetrahedra whose face nodes the guard moved."""
@@ -46,11 +45,6 @@ class SplitCounts(Arrays):
     """Face nodes that the guard made for one tetrahedron alone."""
     n_ignored: IntCell
     """Crossings with edges of tetrahedra that were split already."""
-
-
-def no_counts() -> SplitCounts:
-    """Return counts of nothing done so far."""
-    return SplitCounts(n_of_case=np.zeros(len(CASES), np.int64), n_guarded=0, n_own=0, n_ignored=0)
 
 
 class Split(Arrays):
