@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, NoReturn, Protocol
+from typing import NamedTuple, NoReturn
 
 from tissue.cut_settings import SCHEMES, CutSettings
 from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.stellar_scheme import StellarScheme
-from tissue.cutting.workspace import SnapLimits
+from tissue.cutting.workspace import Scheme, SnapLimits
 from tissue.mesh.body import Body
-from tissue.mesh.changes import Change, ChangedMesh
+from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.star import LARGEST_STAR, Visits
-from tissue.types import SchemeStatistics, TissueError
+from tissue.types import TissueError
 
 INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
@@ -58,63 +58,6 @@ class CutHooks(NamedTuple):
     """Called after the last pass."""
     mesh: Callable[[], tuple[Body, Visits]]
     """Returns the body as it is now, and scratch for searches."""
-
-
-class Scheme(Protocol):
-    """A method of cutting a mesh. It owns the arrays of the incision, not those of the body.
-
-    A cut step is `detect` (CD), then `cut` (GC). Where `cut` runs out of room (`change.is_full`),
-    `grow`, `detect` and `cut` follow until one pass is complete.
-    """
-
-    change: Change
-    """Changes of the last pass, and the area cut since the body was made."""
-
-    @property
-    def n_active(self) -> int:
-        """Number of active tetrahedra (paper, section 3)."""
-        ...
-
-    def detect(self, body: Body, visits: Visits, path: Path) -> None:
-        """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
-        ...
-
-    def cut(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut what was detected, in one pass."""
-        ...
-
-    def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut up to the edge itself, which rests, in one pass."""
-        ...
-
-    def end(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut what remains when the blade has left the incision, in one pass."""
-        ...
-
-    def finish(self, body: Body, visits: Visits, path: Path) -> None:
-        """Part small bridges that the blade passed over, in one pass; nothing may be left to do."""
-        ...
-
-    def forget(self) -> None:
-        """Forget the incision: what is detected next belongs to another."""
-        ...
-
-    def statistics(self, body: Body) -> SchemeStatistics | None:
-        """Return counts of what was done so far; None where the scheme keeps none."""
-        ...
-
-    @property
-    def doubled_nodes(self) -> int:
-        """For how many times as many doubled nodes as usual a pass is to have room."""
-        ...
-
-    def make_room(self, lacking: int) -> None:
-        """Make twice the room for what lacked it: `LISTS`, or `NODES` by `doubled_nodes`."""
-        ...
-
-    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """Make room for that many nodes and tetrahedra."""
-        ...
 
 
 class Incision:

@@ -14,21 +14,15 @@ from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
-from tissue.cutting.cut_surface import begin_cut_surface, new_cut_surface
+from tissue.cutting.cut_surface import begin_cut_surface
 from tissue.cutting.finishing import finish_cut_surface
 from tissue.cutting.minimum_cut import new_flow_graph
 from tissue.cutting.separation import close_cut_surface, open_cut_surface
 from tissue.cutting.snapping import insert_crossings
-from tissue.cutting.workspace import (
-    Cut,
-    SnapLimits,
-    new_cut_scratch,
-    scratch_with_twice_the_room,
-)
+from tissue.cutting.workspace import Cut, Scheme, SnapLimits
 from tissue.mesh.body import Body
-from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the_room
+from tissue.mesh.changes import clear_changes
 from tissue.mesh.star import Visits
-from tissue.types import SchemeStatistics
 
 ALONG_PATH: Final = 0
 """Cut what was detected along the path of the edge."""
@@ -60,10 +54,8 @@ def cut_in_a_pass(cut: Cut, how_far: int) -> None:
 _DETECT, _CUT = SameTypes(detect_collisions), SameTypes(cut_in_a_pass)
 
 
-class StellarScheme:
+class StellarScheme(Scheme):
     """Our scheme, with cut surface, changes and scratch of the current incision.
-
-    The methods are those of `tissue.cutting.incision.Scheme`.
 
     Args:
         limits: When a node that is there is used in place of a new one.
@@ -72,19 +64,9 @@ class StellarScheme:
     """
 
     def __init__(self, limits: SnapLimits, n_nodes: int, n_tetrahedra: int) -> None:
-        self.change = new_change()
-        self.doubled_nodes = 1
-        self._limits = limits
-        self._surface = new_cut_surface(n_nodes, n_tetrahedra)
-        self._scratch = new_cut_scratch(n_tetrahedra)
+        super().__init__(limits, n_nodes, n_tetrahedra, n_split=n_tetrahedra)
         self._graph = new_flow_graph(n_tetrahedra)
         self._area_before = 0.0
-        self._cut: Cut | None = None
-
-    @property
-    def n_active(self) -> int:
-        """Number of active tetrahedra (paper, section 3)."""
-        return self._scratch.n_active
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
@@ -112,45 +94,12 @@ class StellarScheme:
 
     def forget(self) -> None:
         """Forget the incision: what is detected next belongs to another."""
+        super().forget()
         begin_cut_surface(self._surface)
         self._area_before = self.change.area
-        self._scratch.n_previous = 0
-
-    def make_room(self, lacking: int) -> None:
-        """Make twice the room for what lacked it."""
-        if lacking == NODES:
-            self.doubled_nodes *= 2
-            return
-        self.change = with_twice_the_room(self.change)
-        self._scratch = scratch_with_twice_the_room(self._scratch)
-        self._cut = None
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        self._surface = self._surface.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
+        super().grow(n_nodes, n_tetrahedra)
         self._scratch = self._scratch.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._graph = new_flow_graph(n_tetrahedra)
-        self._cut = None
-
-    def statistics(self, body: Body) -> SchemeStatistics | None:
-        """Return None: there are no cases to count, and no nodes hang."""
-        del body
-        return None
-
-    def _arrays(self, body: Body, visits: Visits, path: Path) -> Cut:
-        """Return all that a pass needs as one struct, made again only where a part is replaced."""
-        cut = self._cut
-        if cut is None or not (cut.body is body and cut.visits is visits and cut.path is path):
-            self._cut = cut = self._struct(body, visits, path)
-        return cut
-
-    def _struct(self, body: Body, visits: Visits, path: Path) -> Cut:
-        return Cut(
-            body=body,
-            visits=visits,
-            surface=self._surface,
-            path=path,
-            change=self.change,
-            scratch=self._scratch,
-            limits=self._limits,
-        )

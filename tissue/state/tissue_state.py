@@ -49,7 +49,7 @@ RULES = StateRules(
         "GlobalStepper._parts": tuple,
         "StepStages._frame": _none,
         "StepStages._parts": tuple,
-        "StellarScheme._cut": _none,
+        "Scheme._cut": _none,
         "BodyChunks._nodes": _none,
     },
     own=frozenset({"GlobalStepper._threads"}),

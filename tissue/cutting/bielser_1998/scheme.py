@@ -32,15 +32,9 @@ from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, line_of_sample, next_event
-from tissue.cutting.cut_surface import new_cut_surface
-from tissue.cutting.workspace import (
-    Cut,
-    SnapLimits,
-    new_cut_scratch,
-    scratch_with_twice_the_room,
-)
+from tissue.cutting.workspace import Cut, Scheme, SnapLimits
 from tissue.mesh.body import Body
-from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the_room
+from tissue.mesh.changes import clear_changes
 from tissue.mesh.nonconforming import HANGING
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
@@ -66,10 +60,8 @@ class Waiting(Arrays):
     """Whether a tetrahedron is in the list, shape (n_tets,)."""
 
 
-class PaperScheme:
+class PaperScheme(Scheme):
     """The paper's scheme, with its records of the initial mesh and scratch.
-
-    The methods are those of `tissue.cutting.incision.Scheme`.
 
     Args:
         body: The body, uncut, with room for hanging nodes.
@@ -78,8 +70,9 @@ class PaperScheme:
     """
 
     def __init__(self, body: Body, density: float, node_size: float) -> None:
-        self.change = new_change()
-        self.doubled_nodes = 1
+        # The cut surface stays empty: this scheme moves no node to it.
+        limits = SnapLimits(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
+        super().__init__(limits, len(body.rest), len(body.tetrahedra))
         self._density = density
         self._reach = _REACH * node_size
         self._records = records_of(body)
@@ -88,15 +81,6 @@ class PaperScheme:
         self._placing = Placing.new({})
         self._references = np.zeros((5, N_LOCAL_NODES), np.int64)
         self._counts = SplitCounts.new({})
-        # For collision detection. The cut surface stays empty: this scheme moves no node to it.
-        self._scratch = new_cut_scratch(0)
-        self._surface = new_cut_surface(len(body.rest), len(body.tetrahedra))
-        self._limits = SnapLimits(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
-
-    @property
-    def n_active(self) -> int:
-        """Number of active tetrahedra (paper, section 3)."""
-        return self._scratch.n_active
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
@@ -114,11 +98,6 @@ class PaperScheme:
         split_left(self._split(body), self._waiting, path, self._reach)
         remember_active(cut)
 
-    def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
-        """Do nothing: a tetrahedron is cut when the blade has left it (paper, section 4.3)."""
-        del body, visits, path
-        clear_changes(self.change)
-
     def end(self, body: Body, visits: Visits, path: Path) -> None:
         """Split the tetrahedra that wait for the blade to leave, in one pass."""
         del visits
@@ -126,27 +105,10 @@ class PaperScheme:
         self._scratch.n_active = 0
         split_left(self._split(body), self._waiting, path, GONE)
 
-    def finish(self, body: Body, visits: Visits, path: Path) -> None:
-        """Do nothing: what the scheme cannot split it leaves whole, and counts."""
-        del body, visits, path
-        clear_changes(self.change)
-
     def forget(self) -> None:
         """Forget the incision. Its edges stay cut: each tetrahedron is processed once."""
+        super().forget()
         self._records.incision += 1
-        self._scratch.n_previous = 0
-
-    def make_room(self, lacking: int) -> None:
-        """Make twice the room for what lacked it."""
-        if lacking == NODES:
-            self.doubled_nodes *= 2
-            return
-        self.change = with_twice_the_room(self.change)
-        self._scratch = scratch_with_twice_the_room(self._scratch)
-
-    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """Make room for that many nodes and tetrahedra."""
-        self._surface = self._surface.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return counts of what was done so far."""
@@ -162,17 +124,6 @@ class PaperScheme:
             references=self._references,
             counts=self._counts,
             density=self._density,
-        )
-
-    def _arrays(self, body: Body, visits: Visits, path: Path) -> Cut:
-        return Cut(
-            body=body,
-            visits=visits,
-            surface=self._surface,
-            path=path,
-            change=self.change,
-            scratch=self._scratch,
-            limits=self._limits,
         )
 
 
