@@ -41,8 +41,8 @@ from .laws.mass_spring import MassSpring as MassSpring
 from .laws.neo_hookean import NeoHookean as NeoHookean
 from .laws.yeoh import Yeoh as Yeoh
 from .loads.attachment import Attachment as Attachment
-from .loads.frame_path import FramePath as FramePath
-from .loads.ligament import Ligament as Ligament
+from .loads.attachment import FramePath as FramePath
+from .loads.attachment import Ligament as Ligament
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
 from .material import Material as Material

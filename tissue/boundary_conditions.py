@@ -123,14 +123,8 @@ def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) ->
             "each coordinate of the first corner must be the smaller"
         )
     slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
-    mask: BoolArray = np.all(
-        (mesh.positions >= low - slack) & (mesh.positions <= high + slack), axis=1
-    )
-    if not mask.any():
-        raise ValueError(
-            f"no node is in the box from {_text(low)} to {_text(high)} m; {_where(mesh.positions)}"
-        )
-    return mask
+    mask = np.all((mesh.positions >= low - slack) & (mesh.positions <= high + slack), axis=1)
+    return _with_nodes(mask, mesh, f"in the box from {_text(low)} to {_text(high)} m")
 
 
 def sphere_nodes(mesh: TetrahedralMesh, centre: npt.ArrayLike, radius: float) -> BoolArray:
@@ -144,13 +138,8 @@ def sphere_nodes(mesh: TetrahedralMesh, centre: npt.ArrayLike, radius: float) ->
     if not (math.isfinite(radius) and radius > 0.0):
         raise ValueError(f"the radius of the sphere is {radius} m; it must be positive and finite")
     slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
-    mask: BoolArray = np.linalg.norm(mesh.positions - middle, axis=1) <= radius + slack
-    if not mask.any():
-        raise ValueError(
-            f"no node is in the sphere of {radius:.4g} m around {_text(middle)} m; "
-            f"{_where(mesh.positions)}"
-        )
-    return mask
+    mask = np.linalg.norm(mesh.positions - middle, axis=1) <= radius + slack
+    return _with_nodes(mask, mesh, f"in the sphere of {radius:.4g} m around {_text(middle)} m")
 
 
 def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLike) -> BoolArray:
@@ -167,13 +156,9 @@ def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLi
     if length == 0.0:
         raise ValueError("the normal of the plane is zero; it must point to the nodes to hold")
     slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
-    mask: BoolArray = (mesh.positions - point) @ (normal / length) >= -slack
-    if not mask.any():
-        raise ValueError(
-            f"no node is beyond the plane through {_text(point)} m with normal {_text(normal)}; "
-            f"{_where(mesh.positions)}"
-        )
-    return mask
+    mask = (mesh.positions - point) @ (normal / length) >= -slack
+    place = f"beyond the plane through {_text(point)} m with normal {_text(normal)}"
+    return _with_nodes(mask, mesh, place)
 
 
 def listed_nodes(mesh: TetrahedralMesh, nodes: npt.ArrayLike) -> BoolArray:
@@ -283,10 +268,12 @@ def _point(values: npt.ArrayLike, name: str) -> FloatArray:
     return point
 
 
-def _where(positions: FloatArray) -> str:
-    """Return a sentence that says where the body is."""
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    return f"the body goes from {_text(low)} to {_text(high)} m"
+def _with_nodes(mask: BoolArray, mesh: TetrahedralMesh, place: str) -> BoolArray:
+    """Return a mask, or raise an error where it holds no node: that none is at the place."""
+    if not mask.any():
+        low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+        raise ValueError(f"no node is {place}; the body goes from {_text(low)} to {_text(high)} m")
+    return mask
 
 
 def _text(point: FloatArray) -> str:

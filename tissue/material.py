@@ -29,6 +29,9 @@ SHORTEST_RELAXATION = 0.01
 """Shortest time constant of a Prony series [s]: ten steps of 1 ms, which resolve it. Damping is for
 what is faster."""
 
+_OF_LAWS = ("stiffening", "yeoh_second", "yeoh_third", "spring_calibration")
+"""Keywords of `Material` for parameters of laws, in their order."""
+
 _log = logging.getLogger("tissue")
 
 
@@ -109,19 +112,8 @@ class Material:
     viscoelasticity, `tissue.elasticity.viscoelasticity`). `young_modulus` and the other stiffnesses
     are those of fast motion."""
 
-    def __post_init__(
-        self,
-        stiffening: float | None,
-        yeoh_second: float | None,
-        yeoh_third: float | None,
-        spring_calibration: float | None,
-    ) -> None:
-        given = {
-            "stiffening": stiffening,
-            "yeoh_second": yeoh_second,
-            "yeoh_third": yeoh_third,
-            "spring_calibration": spring_calibration,
-        }
+    def __post_init__(self, *of_law: float | None) -> None:
+        given = zip(_OF_LAWS, of_law, strict=True)
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name not in ("law", "prony") and (not math.isfinite(value) or value < 0.0):
@@ -129,7 +121,7 @@ class Material:
         for name in ("young_modulus", "density", "toughness_speed"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} is 0; it must be positive")
-        parameters = {name: value for name, value in given.items() if value is not None}
+        parameters = {name: value for name, value in given if value is not None}
         object.__setattr__(self, "law", law_with(self.law, parameters))
         self._check_ratio()
         object.__setattr__(self, "prony", checked_series(self.prony))

@@ -14,8 +14,7 @@ from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.memento import Spares
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
-from tissue.loads.attachment import Attachment
-from tissue.loads.ligament import Ligament, ends_of_fibres
+from tissue.loads.attachment import Attachment, Ligament, ends_of_fibres
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints, points_of
 from tissue.material import Material

@@ -143,30 +143,29 @@ class Memento:
 
     def _walk(self, value: Any) -> None:
         """Add an object, and those that it refers to."""
-        kind = self._kinds.of(value)
-        if kind == _LEAF or id(value) in self._seen:
+        kind = self._kinds[type(value)]
+        order = kind.order
+        if order == _LEAF or id(value) in self._seen:
             return
         self._seen.add(id(value))
-        if kind == _TUPLE:
+        if order == _TUPLE:
             for item in tuple.__iter__(value):
                 self._walk(item)
-        elif kind == _STRUCT:
+        elif order == _STRUCT:
             self.structs.append(value)
             for name in nested_structs(type(value)):
                 self._walk(getattr(value, name))
-        elif kind == _ARRAY:
+        elif order == _ARRAY:
             if value.flags.writeable:
                 self.arrays.append((value, value.copy()))
-        elif kind == _OBJECT:
+        elif order == _OBJECT:
             attributes = attributes_of(value)
-            for name in self._kinds.own(type(value)):
-                attributes.pop(name, None)
-            for name in self._kinds.derived(type(value)):
+            for name in (*kind.own, *kind.derived):
                 attributes.pop(name, None)
             self.objects.append((value, attributes))
             for part in attributes.values():
                 self._walk(part)
-        elif kind == _LIST:
+        elif order == _LIST:
             self.lists.append((value, list(value)))
             for item in value:
                 self._walk(item)
@@ -180,8 +179,9 @@ class Memento:
         kinds = _kinds_under(self.rules)
         for owner, attributes in self.objects:
             # What was derived then may have gone on since: it is made again.
-            derived = {name: make() for name, make in kinds.derived(type(owner)).items()}
-            set_attributes(owner, attributes | derived, kinds.own(type(owner)))
+            kind = kinds[type(owner)]
+            derived = {name: make() for name, make in kind.derived.items()}
+            set_attributes(owner, attributes | derived, kind.own)
         for each, items in self.lists:
             each[:] = items
         for table, entries in self.dicts:
@@ -225,38 +225,32 @@ def derived_in(rules: StateRules, kind: type) -> dict[str, Callable[[], Any]]:
     return {attribute: make for (base, attribute), make in split if base in bases}
 
 
-class _Kinds:
-    """Order in which objects of each class are walked, under some rules."""
+class _Kind(NamedTuple):
+    """How objects of a class are walked under some rules."""
+
+    order: int
+    """What they are: `_LEAF`, `_OBJECT` and so on."""
+    own: frozenset[str] = frozenset()
+    """Attributes that are no state."""
+    derived: Mapping[str, Callable[[], Any]] = MappingProxyType({})
+    """Attributes that are made again, and what makes their defaults."""
+
+
+class _Kinds(dict[type, _Kind]):
+    """How objects of each class are walked under some rules."""
 
     def __init__(self, rules: StateRules) -> None:
+        super().__init__({kind: _Kind(_LEAF) for kind in _ATOMS})
         self._rules = rules
-        self._of: dict[type, int] = {kind: _LEAF for kind in _ATOMS}
-        self._own: dict[type, frozenset[str]] = {}
-        self._derived: dict[type, dict[str, Callable[[], Any]]] = {}
 
-    def of(self, value: Any) -> int:
-        """Return how an object is walked."""
-        kind = type(value)
-        found = self._of.get(kind)
-        if found is None:
-            found = self._of[kind] = self._look_up(kind)
+    def __missing__(self, kind: type) -> _Kind:
+        """Find it out for a class that was not met before."""
+        order, rules = self._order_of(kind), self._rules
+        own, derived = attributes_in(rules.own, kind), derived_in(rules, kind)
+        found = self[kind] = _Kind(order, own, derived) if order == _OBJECT else _Kind(order)
         return found
 
-    def own(self, kind: type) -> frozenset[str]:
-        """Return the attributes of a class that are no state."""
-        found = self._own.get(kind)
-        if found is None:
-            found = self._own[kind] = attributes_in(self._rules.own, kind)
-        return found
-
-    def derived(self, kind: type) -> dict[str, Callable[[], Any]]:
-        """Return the attributes of a class that are made again, and what makes their defaults."""
-        found = self._derived.get(kind)
-        if found is None:
-            found = self._derived[kind] = derived_in(self._rules, kind)
-        return found
-
-    def _look_up(self, kind: type) -> int:
+    def _order_of(self, kind: type) -> int:
         if kind.__name__ in self._rules.kept or issubclass(kind, (Vectors, type)):
             return _LEAF
         for base, found in (

@@ -65,14 +65,7 @@ class Team(Arrays):
 
 def new_team() -> Team:
     """Return a team of one thread."""
-    return Team(
-        is_shared=0,
-        loop=0,
-        n_items=0,
-        chunk_size=1,
-        seconds=0.0,
-        numbers=aligned(_N_SHARED, int),
-    )
+    return Team.new({}, chunk_size=1, numbers=aligned(_N_SHARED, int))
 
 
 @kernel

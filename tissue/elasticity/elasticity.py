@@ -17,10 +17,7 @@ from tissue.elasticity.finite_elements import (
 from tissue.elasticity.frequency.changes import forget_added_mass, return_mass, update_frequencies
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.mass_scaling import (
-    LARGEST_ADDED_MASS,
-    no_mass_scaling,
-)
+from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, no_mass_scaling
 from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
 from tissue.laws.energy_density import volume_term
@@ -73,7 +70,8 @@ class Elasticity:
         law = material.law.density(material.moduli)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self._may_collapse = law is None and resists_collapse
-        self.arrays = Elastic(
+        self.arrays = Elastic.new(
+            {"nodes": n_nodes},
             springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
             solid=no_solid(
                 law or volume_term(0.0),
@@ -89,11 +87,7 @@ class Elasticity:
             ),
             has_springs=int(material.law.has_springs),
             has_tetrahedra=int(law is not None),
-            highest=0.0,
-            highest_of_tetrahedra=0.0,
-            highest_of_dampers=0.0,
             scaling=no_mass_scaling(),
-            frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
@@ -148,17 +142,13 @@ class Elasticity:
         if self._has_solid:
             pool = max(len(solid.corner), room_for_stars(n_nodes, n_tetrahedra))
             solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
-        frequencies = np.zeros(n_nodes)
-        frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
         collapsing = arrays.collapsing
         if self._may_collapse:
             collapsing = collapsing.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
-        self.arrays = arrays.replaced(
-            collapsing=collapsing,
-            springs=arrays.springs.grown({"nodes": n_nodes, "pool": len(arrays.springs.neighbour)}),
-            solid=solid,
-            frequency_squared=frequencies,
-        )
+        pool = len(arrays.springs.neighbour)
+        springs = arrays.springs.grown({"nodes": n_nodes, "pool": pool})
+        larger = arrays.grown({"nodes": n_nodes})
+        self.arrays = larger.replaced(collapsing=collapsing, springs=springs, solid=solid)
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
         n = len(nodes)

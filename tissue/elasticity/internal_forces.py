@@ -7,6 +7,7 @@ or both are elastic. Dampers lie along the edges under either law.
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of
+from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.collapse import Collapsing
@@ -44,7 +45,7 @@ class Elastic(Arrays, two_precisions=True):
     stiffness of springs under either law."""
     scaling: MassScaling
     """Which nodes get mass where tetrahedra carry the shear."""
-    frequency_squared: FloatArray
+    frequency_squared: FloatArray = sized("nodes")
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
 
 

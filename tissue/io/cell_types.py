@@ -20,6 +20,35 @@ class CellType(NamedTuple):
     """Number of nodes; 0 where it varies."""
 
 
+_SHAPES = {
+    "points": (0, 1),
+    "lines": (1, 2),
+    "triangles": (2, 3),
+    "quadrangles": (2, 4),
+    "tetrahedra": (3, 4),
+    "pyramids": (3, 5),
+    "prisms": (3, 6),
+    "wedges": (3, 6),
+    "hexahedra": (3, 8),
+}
+"""Shapes of cells: dimension, and number of corners."""
+
+
+def cell_types(numbers: Mapping[str, Mapping[int, int]]) -> dict[int, CellType]:
+    """Return the types of cells by a format's numbers of them.
+
+    Args:
+        numbers: For each shape the number of each type, and how many nodes that has.
+    """
+    made = {}
+    for shape, types in numbers.items():
+        dimension, n_corners = _SHAPES[shape]
+        for number, n in types.items():
+            name = shape if n == n_corners else f"{shape} with {n} nodes"
+            made[number] = CellType(name, dimension, n)
+    return made
+
+
 def expect_tetrahedra(
     counts: Mapping[int, int], cell_types: Mapping[int, CellType], tetrahedron: int
 ) -> None:
@@ -107,37 +136,33 @@ def uniform_records(
 _TETRAHEDRON = 10
 
 _CELL_TYPES = {
+    **cell_types(
+        {
+            "points": {1: 1},
+            "lines": {3: 2, 21: 3},
+            "triangles": {5: 3, 22: 6, 34: 7},
+            "quadrangles": {9: 4, 23: 8, 28: 9},
+            "tetrahedra": {10: 4, 24: 10},
+            "hexahedra": {12: 8, 25: 20},
+            "wedges": {13: 6},
+            "pyramids": {14: 5},
+        }
+    ),
     0: CellType("empty cells", 0, 0),
-    1: CellType("points", 0, 1),
     2: CellType("groups of points", 0, 0),
-    3: CellType("lines", 1, 2),
     4: CellType("polylines", 1, 0),
-    5: CellType("triangles", 2, 3),
     6: CellType("triangle strips", 2, 0),
     7: CellType("polygons", 2, 0),
     8: CellType("pixels", 2, 4),
-    9: CellType("quadrangles", 2, 4),
-    10: CellType("tetrahedra", 3, 4),
     11: CellType("voxels", 3, 8),
-    12: CellType("hexahedra", 3, 8),
-    13: CellType("wedges", 3, 6),
-    14: CellType("pyramids", 3, 5),
-    21: CellType("lines with 3 nodes", 1, 3),
-    22: CellType("triangles with 6 nodes", 2, 6),
-    23: CellType("quadrangles with 8 nodes", 2, 8),
-    24: CellType("tetrahedra with 10 nodes", 3, 10),
-    25: CellType("hexahedra with 20 nodes", 3, 20),
-    28: CellType("quadrangles with 9 nodes", 2, 9),
-    34: CellType("triangles with 7 nodes", 2, 7),
     42: CellType("polyhedra", 3, 0),
-    68: CellType("Lagrange curves", 1, 0),
-    69: CellType("Lagrange triangles", 2, 0),
-    70: CellType("Lagrange quadrangles", 2, 0),
-    71: CellType("Lagrange tetrahedra", 3, 0),
-    75: CellType("Bezier curves", 1, 0),
-    76: CellType("Bezier triangles", 2, 0),
-    77: CellType("Bezier quadrangles", 2, 0),
-    78: CellType("Bezier tetrahedra", 3, 0),
+    **{
+        first + k: CellType(f"{kind} {shape}", dimension, 0)
+        for first, kind in ((68, "Lagrange"), (75, "Bezier"))
+        for k, (shape, dimension) in enumerate(
+            (("curves", 1), ("triangles", 2), ("quadrangles", 2), ("tetrahedra", 3))
+        )
+    },
 }
 
 

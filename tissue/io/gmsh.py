@@ -4,8 +4,6 @@ Versions 1 and 2 have one record for each node and element; version 4.1 has them
 each entity of the geometry.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
@@ -211,32 +209,8 @@ def read_gmsh_4(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
     return elements.mesh(tags, positions)
 
 
-class _Section(Protocol):
-    """The numbers of a section in their order, written as text or in binary."""
-
-    reader: ByteReader
-
-    def ints(self, count: int, what: str) -> IntArray:
-        """Take C's `int`s."""
-
-    def sizes(self, count: int, what: str) -> IntArray:
-        """Take C's `size_t`s."""
-
-    def floats(self, count: int, what: str) -> FloatArray:
-        """Take C's `double`s."""
-
-    def end(self) -> None:
-        """Fail unless all has been taken."""
-
-
-def _section(reader: ByteReader, name: str, byte_order: str) -> _Section:
-    """Return the numbers of a section."""
-    reader.at = reader.find(rb"(?m)^[ \t]*\$%b[ \t]*\r?\n" % name.encode(), f"${name}").end()
-    return _Binary(reader, name, byte_order) if byte_order else _Text(reader, name)
-
-
 class _Text:
-    """The numbers of a section that is written as text."""
+    """The numbers of a section that is written as text, taken in their order."""
 
     def __init__(self, reader: ByteReader, name: str) -> None:
         self.reader = reader
@@ -270,7 +244,7 @@ class _Text:
 
 
 class _Binary:
-    """The numbers of a section that is written in binary."""
+    """The same of a section that is written in binary: C's `int`, `size_t` and `double`."""
 
     def __init__(self, reader: ByteReader, name: str, byte_order: str) -> None:
         self.reader = reader
@@ -291,6 +265,15 @@ class _Binary:
         line = self.reader.line_with_text()
         if line != f"$End{self._name}":
             self.reader.fail(f"expected $End{self._name} after what was counted", at)
+
+
+_Section = _Text | _Binary
+
+
+def _section(reader: ByteReader, name: str, byte_order: str) -> _Section:
+    """Return the numbers of a section."""
+    reader.at = reader.find(rb"(?m)^[ \t]*\$%b[ \t]*\r?\n" % name.encode(), f"${name}").end()
+    return _Binary(reader, name, byte_order) if byte_order else _Text(reader, name)
 
 
 def _nodes(section: _Section) -> tuple[IntArray, FloatArray]:

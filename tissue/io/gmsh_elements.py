@@ -4,47 +4,24 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader
-from tissue.io.cell_types import CellType, expect_ignorable, expect_tetrahedra
+from tissue.io.cell_types import CellType, cell_types, expect_ignorable, expect_tetrahedra
 from tissue.mesh.mesh_arrays import MeshError
 from tissue.types import TetrahedralMesh
 
 _TETRAHEDRON = 4
 
-_CELL_TYPES = {
-    1: CellType("lines", 1, 2),
-    2: CellType("triangles", 2, 3),
-    3: CellType("quadrangles", 2, 4),
-    4: CellType("tetrahedra", 3, 4),
-    5: CellType("hexahedra", 3, 8),
-    6: CellType("prisms", 3, 6),
-    7: CellType("pyramids", 3, 5),
-    8: CellType("lines with 3 nodes", 1, 3),
-    9: CellType("triangles with 6 nodes", 2, 6),
-    10: CellType("quadrangles with 9 nodes", 2, 9),
-    11: CellType("tetrahedra with 10 nodes", 3, 10),
-    12: CellType("hexahedra with 27 nodes", 3, 27),
-    13: CellType("prisms with 18 nodes", 3, 18),
-    14: CellType("pyramids with 14 nodes", 3, 14),
-    15: CellType("points", 0, 1),
-    16: CellType("quadrangles with 8 nodes", 2, 8),
-    17: CellType("hexahedra with 20 nodes", 3, 20),
-    18: CellType("prisms with 15 nodes", 3, 15),
-    19: CellType("pyramids with 13 nodes", 3, 13),
-    20: CellType("triangles with 9 nodes", 2, 9),
-    21: CellType("triangles with 10 nodes", 2, 10),
-    22: CellType("triangles with 12 nodes", 2, 12),
-    23: CellType("triangles with 15 nodes", 2, 15),
-    24: CellType("triangles with 15 nodes", 2, 15),
-    25: CellType("triangles with 21 nodes", 2, 21),
-    26: CellType("lines with 4 nodes", 1, 4),
-    27: CellType("lines with 5 nodes", 1, 5),
-    28: CellType("lines with 6 nodes", 1, 6),
-    29: CellType("tetrahedra with 20 nodes", 3, 20),
-    30: CellType("tetrahedra with 35 nodes", 3, 35),
-    31: CellType("tetrahedra with 56 nodes", 3, 56),
-    92: CellType("hexahedra with 64 nodes", 3, 64),
-    93: CellType("hexahedra with 125 nodes", 3, 125),
-}
+_CELL_TYPES = cell_types(
+    {
+        "points": {15: 1},
+        "lines": {1: 2, 8: 3, 26: 4, 27: 5, 28: 6},
+        "triangles": {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21},
+        "quadrangles": {3: 4, 10: 9, 16: 8},
+        "tetrahedra": {4: 4, 11: 10, 29: 20, 30: 35, 31: 56},
+        "hexahedra": {5: 8, 12: 27, 17: 20, 92: 64, 93: 125},
+        "prisms": {6: 6, 13: 18, 18: 15},
+        "pyramids": {7: 5, 14: 14, 19: 13},
+    }
+)
 
 
 class Elements:

@@ -1,8 +1,7 @@
 """What drives a body from outside: loads on material points, and supports that move.
 
 material_points    points of the material, which survive cuts
-attachment         springs to a frame that is moved from outside
+attachment         springs to a frame that is moved from outside, and fibres that the blade cuts
 load               a force on such points, and all loads of a body
-ligament           fibres to the world, which the blade can cut
 handles            loads, attachments, geoms and supports of one body, step by step
 """

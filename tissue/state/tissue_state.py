@@ -12,9 +12,7 @@ import numpy as np
 from tissue.contact.geoms.geom import Geom
 from tissue.core.memento import Memento, Spares, StateRules
 from tissue.core.memento_reading import StateError, put_to, written
-from tissue.loads.attachment import Attachment
-from tissue.loads.frame_path import FramePath
-from tissue.loads.ligament import Ligament
+from tissue.loads.attachment import Attachment, FramePath, Ligament
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints
 from tissue.state.identity import Identity

@@ -38,8 +38,7 @@ from tissue.contact.response.contacts import PenaltyForces
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import dot, norm, sub
-from tissue.loads.attachment import Attachment
-from tissue.loads.ligament import Ligament
+from tissue.loads.attachment import Attachment, Ligament
 from tissue.mesh.body import Body
 from tissue.mesh.pieces import components
 from tissue.stepping.stages import StepStages
