@@ -26,10 +26,6 @@ def frames(draw):
     return TissueFrame(np.array(rotation), draw(vectors))
 
 
-def test_a_point_in_front_of_a_turned_tissue_is_on_its_side():
-    np.testing.assert_allclose(TURNED.points_to_tissue(np.array([1.0, 2.0, 3.0])), [2, 0, 3])
-
-
 def test_forward_turns_with_the_frame_but_does_not_move_with_it():
     segment = BladeSegment(np.zeros(3), np.ones(3), np.array([0.0, 1.0, 0.0]))
     np.testing.assert_allclose(TURNED.segment_to_tissue(segment).forward, [1, 0, 0])

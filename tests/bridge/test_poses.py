@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from bridge.poses import half_length, motion, moved
+from bridge.arithmetic import compiled_arithmetic
+from bridge.collision.swept_box import edge_axes
+from bridge.poses import half_length, motion, moved, pose_of
 from tissue import BladeSegment
 
 UPRIGHT = BladeSegment(np.zeros(3), np.array([0.0, 0.0, 0.04]), np.array([0.0, 1.0, 0.0]))
@@ -15,6 +18,25 @@ vectors = st.tuples(components, components, components).map(np.array)
 def test_a_blade_that_slides_does_not_turn():
     slid = UPRIGHT._replace(tip=UPRIGHT.tip + 0.01, heel=UPRIGHT.heel + 0.01)
     assert motion(UPRIGHT, slid) == pytest.approx([0.01, 0.01, 0.01, 0.0, 0.0, 0.0])
+
+
+def random_pose(rng):
+    edge, forward = 0.04 * np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
+    tip = rng.normal(size=3)
+    tilted = forward + 0.3 * edge
+    return BladeSegment(tip, tip + edge, tilted / np.linalg.norm(tilted))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_motion_is_that_of_the_rotation_matrix(seed):
+    rng = np.random.default_rng(seed)
+    before, after = random_pose(rng), random_pose(rng)
+    turn = Rotation.from_matrix(edge_axes(after) @ edge_axes(before).T).as_rotvec()
+    expected = np.concatenate([after.tip - before.tip, turn])
+    assert motion(before, after) == pytest.approx(expected, abs=1e-9)
+    one, other = pose_of(before), pose_of(after)
+    again = compiled_arithmetic().motion.call(one.tip, one.axes, other.tip, other.axes)
+    assert again == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_quarter_turn_about_the_edge_turns_the_flat():

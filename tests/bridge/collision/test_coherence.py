@@ -67,19 +67,6 @@ def test_every_answer_is_the_one_of_a_comparison_in_every_frame(shape, seed):
     assert 100 < sum(touches) < 1900
 
 
-def test_a_blade_that_stays_away_is_compared_rarely(n_compared):
-    phase = BroadPhase(BOX, 3.0, blade=BladeShape())
-    there = BladeSegment(np.array([0, 0, 0.1]), np.array([0, 0.04, 0.1]), np.array([0, 0, -1.0]))
-    before = pose_of(there)
-    for i in range(1000):  # from 80 mm to 30 mm above the box
-        down = np.array([0.0, 0.0, -5e-5 * i])
-        after = pose_of(there._replace(tip=there.tip + down, heel=there.heel + down))
-        phase.update_bounds(BOX, DT)
-        assert not phase.overlaps(before, after, DT).tissue
-        before = after
-    assert 1 <= n_compared() <= 5
-
-
 def divided(bounds, rng):
     """Return chunks in a box, which leave gaps."""
     low, high = bounds
@@ -110,17 +97,23 @@ def test_every_answer_about_chunks_is_the_one_of_a_comparison_in_every_frame(sha
     assert 40 < sum(touches) < 1900
 
 
-def test_a_blade_that_stays_near_is_compared_rarely(n_compared):
+NEAR = BladeSegment(np.array([0, 0, 0.022]), np.array([0, 0.04, 0.025]), np.array([0, 0, -1.0]))
+FAR = NEAR._replace(tip=np.array([0, 0, 0.1]), heel=np.array([0, 0.04, 0.1]))
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "touches"),
+    [(NEAR, (1e-5, 0.0, 0.0), True), (FAR, (0.0, 0.0, -5e-5), False)],  # from 80 to 30 mm above
+    ids=["stays near", "stays away"],
+)
+def test_a_blade_is_compared_rarely(start, step, touches, n_compared):
     phase = BroadPhase(BOX, SOUND_SPEED, blade=BladeShape(), chunks=lambda: Chunks(BOX[None], 0.0))
-    there = BladeSegment(
-        np.array([0, 0, 0.022]), np.array([0, 0.04, 0.025]), np.array([0, 0, -1.0])
-    )
-    before = pose_of(there)
+    before = pose_of(start)
     for i in range(1000):
-        aside = np.array([1e-5 * i, 0.0, 0.0])
-        after = pose_of(there._replace(tip=there.tip + aside, heel=there.heel + aside))
+        by = i * np.array(step)
+        after = pose_of(start._replace(tip=start.tip + by, heel=start.heel + by))
         phase.update_bounds(BOX, DT)
-        assert phase.overlaps(before, after, DT).tissue
+        assert phase.overlaps(before, after, DT).tissue == touches
         before = after
     assert 1 <= n_compared() <= 5
 

@@ -131,17 +131,6 @@ def test_boxes_side_by_side_are_as_far_apart_as_their_faces():
     assert gap_between(one, one._replace(centre=np.array([1.9, 0.3, 0.0]))) == 0.0
 
 
-def test_crossed_edges_are_found_apart():
-    """Two long bars at right angles, each on its edge: only their edges separate them."""
-    s = np.sqrt(0.5)
-    along_x = np.array([[1.0, 0.0, 0.0], [0.0, s, -s], [0.0, s, s]])
-    along_y = np.array([[s, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, s]])
-    one = SweptBox(np.zeros(3), np.array([9.0, 1.0, 1.0]), along_x)
-    above = np.array([0.0, 0.0, np.sqrt(2.0) + 0.01])
-    other = SweptBox(above, np.array([1.0, 9.0, 1.0]), along_y)
-    assert gap_between(one, other) == pytest.approx(0.01)
-
-
 @given(boxes, boxes, st.integers(0, 2**32 - 1))
 def test_no_two_points_of_the_boxes_are_nearer_than_the_gap(one, other, seed):
     rng = np.random.default_rng(seed)

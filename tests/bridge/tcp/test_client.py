@@ -71,15 +71,6 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert link.cut_report().n_cut_nodes > 0
 
 
-def test_every_client_finds_the_tissue_as_at_the_start(server, upright):
-    with contextlib.closing(link_once_free(server.address)) as first:
-        before = bits(first.snapshot())
-        results = [bits(r) for r in cut(first, upright)]
-    with contextlib.closing(link_once_free(server.address)) as second:
-        assert bits(second.snapshot()) == before
-        assert [bits(r) for r in cut(second, upright)] == results
-
-
 def test_the_description_is_that_of_the_tissue_that_is_served(link):
     here = InProcessLink(make_block(), "block").describe()
     there = link.describe()

@@ -238,15 +238,6 @@ def test_geoms_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
     assert of_here[-1][0].cut_area > 1e-5
 
 
-def test_geoms_of_all_shapes_push_the_block_away_from_them(link):
-    link.collide_with(GEOMS, places(0))
-    for i in range(1, 60):
-        link.step(None, DT, (), places(i))
-    ways = np.array([way for _, _, way in STARTS.values()])
-    along = (link.geom_loads().forces * ways).sum(axis=1)
-    assert (along[1:] < -1e-3).all()
-
-
 def test_a_wrong_number_of_geoms_is_refused_and_the_link_stays(link):
     link.collide_with(GEOMS, places(0))
     with pytest.raises(ValueError, match="and 7 geoms are driven from here"):

@@ -130,14 +130,6 @@ def test_connections_that_prove_no_key_do_not_keep_out_a_client_that_has_it(star
 # ---- a client that went away ---------------------------------------------------------------------
 
 
-def test_a_client_that_stays_silent_loses_its_place(short_silence):
-    with server_in_a_thread() as server, connected_client(server.address) as silent:
-        last = read_all(silent)[-1]
-        assert "silent for too long" in unpack_error(last.payload)
-        with contextlib.closing(link_once_free(server.address)) as link:
-            assert link.n_pieces() == 1
-
-
 def test_a_client_that_asks_now_and_then_keeps_its_place(short_silence):
     with server_in_a_thread() as server, connected_client(server.address) as client:
         for sequence in range(1, 7):

@@ -32,25 +32,25 @@ def expect_refusal(link, message, *step):
     assert bits(link.snapshot()) == before
 
 
-def test_a_blade_that_moves_a_kilometre_in_a_step_is_refused(link, upright):
-    far, near = upright(0.009, -500.0), upright(0.009, 0.01)
-    match = r"the tip of the blade moves by 500 m in one step; at most 0\.561 m are allowed"
-    expect_refusal(link, match, BladeSweep(far, near), DT)
+ALONG = r"the tip of the blade moves by 500 m in one step; at most 0\.561 m are allowed"
+LONG = "an edge of 0.53 m moves by 0.5 m in one step; .* times travel at most 0.0315 m2, 1000"
 
 
-def test_a_blade_that_turns_its_heel_too_far_is_refused(link, upright):
-    after = upright(0.009, 0.01)
-    before = after._replace(heel=after.heel + np.array([0.0, 0.0, 2.0]))
-    expect_refusal(link, "the heel of the blade moves by 2 m", BladeSweep(before, after), DT)
-
-
-def test_a_long_blade_that_moves_far_is_refused(link, upright):
-    after = upright(0.009, 0.01)
-    long = after._replace(heel=after.heel + np.array([0.0, 0.0, 0.5]))
-    match = "an edge of 0.53 m moves by 0.5 m in one step; .* times travel at most 0.0315 m2, 1000"
-    expect_refusal(link, match, BladeSweep(after, long), DT)
-    longer = after._replace(heel=after.heel + np.array([0.0, 0.0, 20.0]))
-    expect_refusal(link, "the length is at most 5.61 m", BladeSweep(longer, longer), DT)
+@pytest.mark.parametrize(
+    ("y", "before", "after", "match"),
+    [
+        (-500.0, 0.0, 0.0, ALONG),
+        (0.01, 2.0, 0.0, "the heel of the blade moves by 2 m"),
+        (0.01, 0.0, 0.5, LONG),
+        (0.01, 20.0, 20.0, "the length is at most 5.61 m"),
+    ],
+)
+def test_a_blade_that_moves_or_turns_too_far_is_refused(link, upright, y, before, after, match):
+    """From a place y, with its edge lengthened by so much [m], to where it touches the block."""
+    start, end = upright(0.009, y), upright(0.009, 0.01)
+    start = start._replace(heel=start.heel + np.array([0.0, 0.0, before]))
+    end = end._replace(heel=end.heel + np.array([0.0, 0.0, after]))
+    expect_refusal(link, match, BladeSweep(start, end), DT)
 
 
 def test_a_blade_that_moves_as_far_as_is_allowed_is_served(link, upright):
