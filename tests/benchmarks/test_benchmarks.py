@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
-from benchmarks.frame import TIMED_PARTS, Stopwatches, Trace, trace_frame
+from benchmarks.frame import Stopwatches, trace_frame
+from benchmarks.kernels import kernels
+from benchmarks.roofline import roofline
 from benchmarks.scaling import (
     RELAXATION_NAME,
     SMALLEST_CUT,
@@ -86,16 +88,6 @@ def test_a_frame_that_cuts_is_traced_the_same_each_time():
     assert "tissue/tissue.py" in first.calls and "bridge/bridge.py" in first.calls
     assert 20 < len(first.calls) < first.n_returns + len(first.calls) == len(first.entered)
     assert all(a != b for a, b in zip(first.entered, first.entered[1:], strict=False))
-
-
-def test_stopwatches_are_put_on_parts_that_exist_and_taken_off():
-    from scalpel_sim.simulation import Simulation
-
-    before = Simulation.step
-    detach = Stopwatches().attach(TIMED_PARTS)
-    assert Simulation.step is not before
-    detach()
-    assert Simulation.step is before
 
 
 def test_time_inside_a_part_is_not_counted_twice():

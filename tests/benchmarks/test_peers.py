@@ -47,15 +47,6 @@ def test_an_engine_in_its_own_process_steps_and_moves_under_gravity(adapter, cas
     assert 1e-6 < turn.moved < 0.01  # metres: it sags, and did not explode
 
 
-def test_output_that_an_engine_prints_is_not_taken_for_an_answer(body, tmp_path):
-    (tmp_path / "mujoco.py").write_text('print("welcome")\nraise ImportError("another MuJoCo")\n')
-    python = tmp_path / "python"
-    python.write_text(f'#!/bin/sh\nPYTHONPATH={tmp_path} exec {sys.executable} "$@"\n')
-    python.chmod(0o755)
-    with pytest.raises(NotInstalledError, match="another MuJoCo"):
-        PeerProcess("mujoco_flex", "Euler:damped", body, python, 0)
-
-
 def test_a_missing_engine_and_one_without_the_case_raise_different_errors(body, tmp_path):
     bare = tmp_path / "python"
     bare.write_text('#!/bin/sh\necho "ModuleNotFoundError: No module named newton" >&2\nexit 1\n')

@@ -9,7 +9,7 @@ import logging
 import socket
 import struct
 import time
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import msgspec
@@ -64,7 +64,8 @@ def converse(case: int) -> list[bool]:
     """
     logging.getLogger("bridge").setLevel(logging.CRITICAL)  # refusals are what is asked for here
     random = np.random.default_rng(case)
-    talks = (_as_stranger, _as_stranger_without_key, _as_client, _as_device)
+    beside = [partial(_beside_a_client, kind) for kind in ("open", "key")]
+    talks = (*beside, _as_client, _as_device)
     return talks[(0, 1, 0, 2, 3, 0, 1, 2, 3, 0)[case % 10]](random)
 
 
@@ -154,12 +155,9 @@ def reference() -> tuple[list[bytes], list[object]]:
 
 def _sweep(i: int) -> BladeSweep:
     """Return the motion of the blade in a step of the honest cut."""
-    return BladeSweep(*(_upright(-0.002 + 0.05 * DT * n) for n in (i, i + 1)))
-
-
-def _upright(y: float) -> BladeSegment:
-    ends = np.array([[0.009, y, -0.005], [0.009, y, 0.025]])
-    return BladeSegment(*ends, np.array([0.0, 1.0, 0.0]))
+    ends, along = np.array([[0.009, -0.002, z] for z in (-0.005, 0.025)]), np.array([0.0, 1.0, 0.0])
+    places = (ends + 0.05 * DT * n * along for n in (i, i + 1))
+    return BladeSweep(*(BladeSegment(*place, along) for place in places))
 
 
 def _outcome(result: object) -> object:
@@ -202,17 +200,8 @@ def _honest(kind: str) -> HonestClient:
 # ---- hostile sides -------------------------------------------------------------------------------
 
 
-def _as_stranger(random: np.random.Generator) -> list[bool]:
-    """Beside a client, send frames with any bytes changed."""
-    return _beside_a_client("open", random)
-
-
-def _as_stranger_without_key(random: np.random.Generator) -> list[bool]:
-    """The same where there is a key, which the stranger does not have."""
-    return _beside_a_client("key", random)
-
-
 def _beside_a_client(kind: str, random: np.random.Generator) -> list[bool]:
+    """Beside a client, send frames with any bytes changed; where there is a key, without it."""
     before = _honest(kind).step()
     requests, _ = reference()
     for i in range(N_FRAMES):

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from scalpel_sim import prepare, read_scene
+from scalpel_sim import read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation.tissue import make_tissue, times_of
@@ -14,8 +14,7 @@ from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.scene.checks import check_attachment
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import AttachmentTable
-from tests.scalpel_sim.served_scenes import served
-from tests.support.run_files import assert_same_rows, assert_same_run
+from tests.support.run_files import assert_same_run
 
 FILE = """\
 seconds = 0.6
@@ -97,17 +96,6 @@ def test_the_scene_that_a_run_writes_gives_the_same_bits_again(first, tmp_path):
     assert command_line(words) == 0
     assert_same_run(first, tmp_path / "again")
     assert (tmp_path / "again" / "scene.toml").read_text() == (first / "scene.toml").read_text()
-
-
-def test_over_tcp_the_paths_and_the_forces_are_the_same_bits(first):
-    scene = read_scene(first / "scene.toml")
-    here = prepare(scene)
-    here.run(0.15)
-    with served(scene) as link:
-        there = prepare(scene, link)
-        there.run(0.15)
-    assert there.recording.n_held == 2
-    assert_same_rows(here.recording, there.recording)
 
 
 def test_a_body_that_only_attachments_hold_hangs_from_them(first):

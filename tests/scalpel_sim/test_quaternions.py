@@ -1,6 +1,5 @@
 """Quaternions in kernels against MuJoCo's functions."""
 
-import math
 import platform
 
 import mujoco
@@ -64,16 +63,3 @@ def assert_as_mujoco(rng):
     assert same(
         quaternions.quaternion_of(numbers(matrix)), by_mujoco(mujoco.mju_mat2Quat, 4, matrix)
     )
-
-
-@pytest.mark.kernel
-@pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize("angle", [0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi])
-def test_a_turn_about_an_axis_has_its_matrix_and_its_quaternion(axis, angle):
-    vector = tuple((angle * np.eye(3)[axis]).tolist())
-    turned = quaternions.turned_on((1.0, 0.0, 0.0, 0.0), vector, 1.0)
-    again = quaternions.quaternion_of(quaternions.matrix_of(turned))
-    assert abs(np.dot(turned, again)) == pytest.approx(1.0)
-    back = quaternions.turn_between((1.0, 0.0, 0.0, 0.0), turned)
-    shortest = angle if angle <= math.pi else angle - 2.0 * math.pi
-    assert np.abs(back) == pytest.approx(abs(shortest) * np.eye(3)[axis], abs=1e-12)

@@ -61,16 +61,19 @@ def test_a_simulation_with_a_start_is_freed_with_its_last_reference():
             gc.enable()
 
 
-def test_a_tissue_in_another_process_cannot_be_reset():
+def test_a_tissue_in_another_process_cannot_be_reset_or_saved():
     scene = SCENES["slab"]
     server = TissueServer(lambda: make_tissue(scene), scene=scene.name, port=0)
     threading.Thread(target=server.run, daemon=True).start()
     with closing(TcpLink(server.address)) as link:
         simulation = prepare(scene, link)
-        with pytest.raises(StateError, match="run without --connect"):
-            simulation.reset()
-        with pytest.raises(StateError, match="run without --connect"):
-            simulation.observe(["points"])
+        for refused in (
+            simulation.reset,
+            simulation.save_state,
+            lambda: simulation.observe(["points"]),
+        ):
+            with pytest.raises(StateError, match="run without --connect"):
+                refused()
         assert simulation.observe(["force", "tetrahedra"])["tetrahedra"] > 0
 
 

@@ -18,7 +18,6 @@ from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.scene.read import DEFAULT_SCENE, scene_called
 from scalpel_sim.scene.scene import GEL, changed
-from scalpel_sim.scene.served import scene_of
 from tests.support.run_files import assert_same_rows, names_in
 from tissue import Tissue, block, write_vtu
 
@@ -32,14 +31,6 @@ def test_two_runs_of_a_scene_give_the_same_bits():
         simulation.run(0.8)
     assert first.result.cut_area > 0.0
     assert_same_rows(first.recording, second.recording)
-
-
-def test_a_run_in_two_parts_is_the_run_in_one():
-    whole, parts = (prepare(GRID2) for _ in range(2))
-    whole.run(0.5)
-    parts.run(0.2)
-    parts.run(0.5)
-    assert_same_rows(whole.recording, parts.recording)
 
 
 def test_a_run_ends_when_its_callback_returns_true():
@@ -134,24 +125,12 @@ def test_a_stretch_moves_held_sides_apart_and_nothing_else():
         pulled_apart(corners, "left,bottom", 0.1)
 
 
-def test_other_sides_held_drop_the_stretch_that_came_with_the_scene():
-    assert changed(GRID2, fixed="bottom").body.stretched_by == 0.0
-    assert changed(GRID2, fixed="bottom", stretch=0.1).body.stretched_by == 0.1
-    assert changed(GRID2, toughness=3.0).body.stretched_by == GRID2.body.stretched_by
-
-
 def test_a_body_is_at_rest_when_the_run_begins():
     tissue = make_tissue(GRID2)
     before = tissue.snapshot().positions
     for _ in range(100):
         tissue.step(None, 1e-3)
     assert np.abs(tissue.snapshot().positions - before).max() < 1e-5
-
-
-def test_a_scene_around_a_body_elsewhere_is_the_scene():
-    soft = changed(GRID2, young_modulus=5e3)
-    found = scene_of(InProcessLink(make_tissue(soft), "grid2"))
-    assert (found.name, found.stroke, found.material) == ("grid2", "straight", soft.material)
 
 
 def test_a_run_lasts_for_the_stroke_and_a_rest_unless_a_time_is_given():
@@ -241,14 +220,6 @@ def test_springs_that_the_blade_would_fold_are_refused_before_the_body_settles(m
     monkeypatch.setattr(Tissue, "settle", lambda tissue: pytest.fail("it settles"))
     with pytest.raises(ValueError, match=r"springs fold ahead of the blade above 0\.6"):
         make_tissue(changed(GRID2, young_modulus=1e3, toughness=60.0))
-
-
-def test_a_mesh_from_a_file_hardly_changes_its_volume_unless_told_otherwise(tmp_path):
-    path = tmp_path / "body.vtu"
-    write_vtu(path, make_tissue(GRID2).snapshot())
-    scene = chosen_scene(None, TissueOptions(body=BodyOptions(mesh=path)))
-    assert (scene.material.law.name, scene.material.poisson_ratio) == ("neo_hookean", 0.45)
-    assert changed(scene, law="springs").material.law.name == "springs"
 
 
 def test_options_change_the_gel_of_a_mesh_from_a_file(tmp_path):

@@ -16,11 +16,6 @@ DT = 1e-3
 
 
 @pytest.mark.parametrize("name", MATERIALS)
-def test_every_material_by_name_has_a_specimen_of_that_name(name):
-    assert SCENES[name].material == MATERIALS[name].material
-
-
-@pytest.mark.parametrize("name", MATERIALS)
 def test_a_specimen_is_cut_in_two_and_nothing_else(name, caplog):
     scene = SCENES[name]
     tissue = make_tissue(scene)
@@ -39,8 +34,9 @@ def test_a_specimen_is_cut_in_two_and_nothing_else(name, caplog):
 
 
 @pytest.mark.parametrize("name", MATERIALS)
-def test_what_is_said_of_a_specimen_is_its_size(name):
+def test_every_material_has_a_specimen_of_its_name_and_the_size_that_is_said(name):
     scene = SCENES[name]
+    assert scene.material == MATERIALS[name].material
     extent = scene.mesh().positions.max(axis=0)
     assert " x ".join(f"{1e3 * size:.3g}" for size in extent) + " mm" in scene.about
     assert f"{1e6 * extent[1] * extent[2]:,.0f} mm²" in scene.about

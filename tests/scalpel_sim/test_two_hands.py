@@ -6,7 +6,6 @@ import pytest
 
 from bridge import InProcessLink
 from scalpel_sim import prepare
-from scalpel_sim.arm.place_search import LINK_RADIUS
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.scene.scene import changed
@@ -173,33 +172,6 @@ def test_a_scene_ends_as_it_should_wherever_its_hands_start(scene, case):
 
 
 # Where the arms stand
-
-
-@EACH
-def test_links_of_the_two_arms_stay_apart_on_their_whole_ways(scene):
-    """Upper arms and forearms, from joint to joint, at every hundredth frame."""
-    simulation = prepare(scene)
-    data = simulation.arm.data
-    chains = [
-        [data.body(prefix + name).id for name in ("torso", "upper_arm", "forearm", "wrist")]
-        for prefix in ("", "left_")
-    ]
-    share = np.linspace(0.0, 1.0, 9)[:, None, None]
-    closest = np.inf
-
-    def measure(now):
-        nonlocal closest
-        if len(now.recording) % 100 == 0:
-            a, b = (data.xpos[chain] for chain in chains)
-            first, second = (
-                ((1.0 - share) * p[:-1] + share * p[1:]).reshape(-1, 3) for p in (a, b)
-            )
-            apart = np.linalg.norm(first[:, None] - second, axis=2)
-            closest = min(closest, float(apart.min()))
-
-    simulation.link.step = still(simulation)
-    simulation.run(simulation.duration, measure)
-    assert closest > 2.0 * LINK_RADIUS
 
 
 def still(simulation):

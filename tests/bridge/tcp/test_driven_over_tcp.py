@@ -71,40 +71,16 @@ def link(server):
         yield link
 
 
-def held_and_cut(link, upright):
-    """Two grips on the ends of the top, one of which lets go, while a blade cuts between them."""
+def held_tied_and_cut(link, upright):
+    """Two grips, one of which lets go by itself, and two strands, between which a blade cuts."""
     bridge, found = Bridge(link), []
     grips = [
         bridge.attach([[x, 0.01, 0.02]], stiffness=50.0, damping=0.5, breaks_at=limit)
         for x, limit in ((0.004, np.inf), (0.016, 0.02))
     ]
-    for i in range(150):
-        for grip in grips:
-            grip.move(grip.pose.origin + np.array([0.0, 0.0, 2e-5]), pose(i).rotation)
-        bridge.step(upright(0.009, -0.002 + 0.1 * DT * i), DT)
-        found.append([(tuple(load.wrench), load.n_points) for load in bridge.frame_loads])
-        if i == 120:
-            bridge.release(grips[0])
-    return found
-
-
-def test_frames_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
-    here = InProcessLink(block_tissue())
-    of_here, of_there = held_and_cut(here, upright), held_and_cut(link, upright)
-    assert bits(tuple(map(tuple, of_here))) == bits(tuple(map(tuple, of_there)))
-    assert bits(here.snapshot()) == bits(link.snapshot())
-    assert [n for _, n in of_here[0]] == [1, 1]
-    assert [n for _, n in of_here[110]] == [1, 0]  # the second has let go by itself
-    assert [n for _, n in of_here[-1]] == [0, 0]
-
-
-def tied_and_cut(link, upright):
-    """Two strands above the top, of which the blade that cuts the block cuts one."""
-    bridge, found = Bridge(link), []
-    ends = [[0.004, 0.01, 0.05], [0.03, 0.03, 0.03]]
-    grip = bridge.tie(
+    tie = bridge.tie(
         [[0.004, 0.01, 0.02], [0.016, 0.01, 0.02]],
-        ends,
+        [[0.004, 0.01, 0.05], [0.03, 0.03, 0.03]],
         stiffness=100.0,
         area=1e-6,
         toughness=100.0,
@@ -112,19 +88,22 @@ def tied_and_cut(link, upright):
         breaks_at=2.0,
     )
     for i in range(200):
+        for grip in grips:
+            grip.move(grip.pose.origin + np.array([0.0, 0.0, 2e-5]), pose(i).rotation)
         bridge.step(upright(0.02, -0.002 + 0.2 * DT * i), DT)
         found.append([(tuple(load.wrench), load.n_points) for load in bridge.frame_loads])
         if i == 170:
-            bridge.release(grip)
+            bridge.release(grips[0])
+            bridge.release(tie)
     return found
 
 
-def test_ties_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
+def test_frames_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
     here = InProcessLink(block_tissue())
-    of_here, of_there = tied_and_cut(here, upright), tied_and_cut(link, upright)
+    of_here, of_there = held_tied_and_cut(here, upright), held_tied_and_cut(link, upright)
     assert bits(tuple(map(tuple, of_here))) == bits(tuple(map(tuple, of_there)))
     assert bits(here.snapshot()) == bits(link.snapshot())
-    assert [of_here[i][0][1] for i in (0, 160, 180)] == [2, 1, 0]
+    assert [[n for _, n in of_here[i]] for i in (0, 160, 180)] == [[1, 1, 2], [1, 0, 1], [0, 0, 0]]
 
 
 def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):
@@ -142,10 +121,7 @@ STRANDS = FrameTie("top", np.array([[0.01, 0.01, 0.05]]), 100.0, 1e-6, 50.0)
     [
         (FrameAttachment("tpo", 100.0), "Did you mean 'top'"),
         (FrameAttachment("top", -1.0), "stiffness is -1.0"),
-        (FrameAttachment("top", np.nan), "the request to attach a frame cannot be read"),
-        (FrameAttachment(np.array([1000]), 100.0), "there is no node 1000"),
         (FrameAttachment(np.array([[9.0, 9.0, 9.0]]), 100.0), "outside the body"),
-        (STRANDS._replace(where="tpo"), "Did you mean 'top'"),
         (STRANDS._replace(area=0.0), "area is 0.0 m2; it must be positive"),
         (STRANDS._replace(stiffness=np.inf), "the request to tie a frame cannot be read"),
         (
@@ -249,8 +225,6 @@ def test_a_wrong_number_of_geoms_is_refused_and_the_link_stays(link):
     ("geoms", "poses", "expected"),
     [
         ([BALL._replace(shape="cone")], ABOVE, "geom 'ball' has the shape 'cone'; there are plane"),
-        ([BALL._replace(size=())], ABOVE, r"sizes \(\); a sphere has 1"),
-        ([BALL._replace(friction=-1.0)], ABOVE, "friction of -1.0"),
         ([BALL._replace(shape="mesh")], ABOVE, "needs `vertices`"),
         ([BALL], ABOVE._replace(origins=CENTRE), "mm inside the tissue at"),
         ([BALL], ABOVE._replace(rotations=np.zeros((1, 3, 3))), "axes of geom 0 are no rotation"),

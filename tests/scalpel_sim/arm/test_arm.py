@@ -153,23 +153,6 @@ def test_mujoco_leaves_no_log_file_behind(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_same_wrenches_give_the_same_motion_bit_for_bit():
-    def run():
-        arm, random = Arm("premium"), np.random.default_rng(1)
-        start, path = arm.blade.segment(), []
-        for k in range(300):
-            shift = np.array([0.0, 1e-4 * k, 0.0])
-            arm.hand.follow(start._replace(tip=start.tip + shift, heel=start.heel + shift))
-            arm.step1()
-            force, torque = random.normal(size=3), 0.02 * random.normal(size=3)
-            arm.blade.apply(Wrench(force, torque, arm.blade.segment().tip))
-            arm.step2()
-            path.append((*arm.data.qpos, *arm.data.qvel))
-        return np.array(path)
-
-    assert run().tobytes() == run().tobytes()
-
-
 def test_a_reset_arm_moves_like_a_new_one():
     arm = Arm("touch")
     fresh = Arm("touch")

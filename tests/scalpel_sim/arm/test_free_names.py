@@ -12,7 +12,6 @@ from scalpel_sim.arm.grasper import PADS_HEEL, PADS_TIP, GuidedGrasper, add_gras
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.scene.scene import changed
 from tests.scalpel_sim.instruments.test_own_arm import EXAMPLES, ROBOT
-from tests.scalpel_sim.served_scenes import served
 from tests.support.run_files import assert_same_rows
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1e-3]])
@@ -135,14 +134,6 @@ def test_robots_with_all_of_our_names_do_the_same_to_the_bit(usual, tmp_path):
     assert np.abs(found.recording.vector("force")).max() > 1e-3
     kept = named_in(found.arm.model)
     assert all(set(taken[kind]) <= kept[kind] for kind in taken if kind != "actuators")
-
-
-def test_over_tcp_too(usual, tmp_path):
-    expected, taken = usual
-    scene = two_robots(tmp_path / "taken", taken)
-    with served(scene) as link:
-        found = ran(scene, link)
-    assert_same_rows(found.recording, expected.recording)
 
 
 OF_GRASPER = ("scalpel_sim_grasper_", "")

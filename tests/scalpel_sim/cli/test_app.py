@@ -31,37 +31,19 @@ WRONG_USE = {
         ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
         "--coupling-stiffness is -1.0; it must be a number above 0",
     ),
-    "a negative number": (["run", "slab", "--skin-toughness", "-1"], "--skin-toughness is -1"),
-    "nothing where there must be some": (
-        ["run", "slab", "--toughness-speed", "0"],
-        "--toughness-speed is 0",
-    ),
     "a whole number beyond its range": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
-    "fewer threads than one": (["run", "slab", "--threads", "0"], "--threads is 0"),
     "an infinite time": (["run", "slab", "--seconds", "inf"], "--seconds is inf"),
     "too many words": (["run", "slab", "grid2"], "grid2"),
     "an unknown scene": (["run", "slap"], "Did you mean 'slab'.*organ"),
     "a scene and a mesh": (["run", "slab", "--mesh", "{mesh}"], "choose one"),
     "a scale without a mesh": (["run", "slab", "--scale", "2"], "--mesh"),
     "a mesh that is not there": (["run", "--mesh", "nothing.msh"], "nothing.msh"),
-    "a mesh that is a folder": (["run", "--mesh", "{folder}"], "{folder}"),
-    "a mesh of the wrong kind": (["run", "--mesh", "{text}"], "text.stl"),
     "a broken mesh": (["run", "--mesh", "{broken}"], "broken.msh"),
     "a mesh of no size": (["run", "--mesh", "{mesh}", "--scale", "0"], "--scale"),
-    "a stroke file that is not there": (["run", "slab", "--stroke", "no.csv"], "no.csv"),
     "a stroke file with a broken line": (["run", "slab", "--stroke", "{bad_stroke}"], "line 3"),
-    "an unknown coupling": (["run", "slab", "--coupling", "virtal"], "Did you mean 'virtual'"),
     "a stiffness of a coupling that has none": (
         ["run", "slab", "--coupling-stiffness", "500"],
         "--coupling-stiffness is for --coupling virtual",
-    ),
-    "a coupling without damping": (
-        ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
-        "damping is 0.0; it must be positive",
-    ),
-    "a negative modulus": (
-        ["run", "slab", "--young", "-1"],
-        "--young is -1.0; it must be a number above 0",
     ),
     "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
     "a list of an unknown material": (["materials", "lung"], "Known: liver"),
@@ -77,17 +59,6 @@ WRONG_USE = {
         ["run", "organ", "--prony", "0.3:0.1,0.2"],
         "the term '0.2'; write g:tau",
     ),
-    "a Prony series that leaves nothing": (
-        ["run", "organ", "--prony", "0.6:0.1,0.4:1"],
-        "sum is 1; it must be below 1",
-    ),
-    "stress that relaxes too fast": (["run", "organ", "--prony", "0.6:0.001"], "at least 0.01 s"),
-    "springs with a Poisson's ratio of 0": (
-        ["run", "slab", "--poisson-ratio", "0"],
-        "Use law neo_hookean",
-    ),
-    "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
-    "bevels that do not fit": (["run", "slab", "--blade-thickness", "0.01"], "only 0.006 m high"),
     "a bevel of a line": (
         ["run", "organ", "--blade-thickness", "0", "--blade-bevel", "10"],
         "--blade-bevel is about a blade with faces",
@@ -108,13 +79,10 @@ WRONG_USE = {
         ["run", "slab", "--relaxation", "hierarchical", "--threads", "2"],
         "--threads 2 is for --relaxation global or verlet; hierarchical runs on one",
     ),
-    "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),
     "a figure by an unknown scheme": (
         ["figure", "10", "--scheme", "mine"],
         "Known: stellar, paper",
     ),
-    "a snap beyond the node": (["run", "slab", "--snap", "2"], "snap is 2"),
-    "a speed of 0": (["run", "slab", "--speed", "0"], "speed"),
     "an output folder that is a file": (["run", "slab", "--out", "{text}"], "is a file"),
     "an invalid address": (["run", "--connect", "here"], "here"),
     "a material for a tissue elsewhere": (
@@ -130,7 +98,6 @@ WRONG_USE = {
         "another machine, and that takes a key",
     ),
     "a key for no server": (["run", "grid2", "--key", "{text}"], "add --connect"),
-    "an invalid key": (["serve", "grid2", "--key", "{text}"], "key file text.stl"),
     "a key written over a file": (["key", "{text}"], "exists already"),
     "a port that does not exist": (["view", "grid2", "--port", "99999"], "99999"),
 }
@@ -227,23 +194,18 @@ def test_a_run_prints_a_table_and_writes_every_file(files, capsys):
     assert "\x1b" not in out + err  # neither colours nor a progress bar off a terminal
 
 
-def test_json_prints_the_summary_and_nothing_else(files, capsys):
+def test_json_prints_the_summary_alone_whose_keys_are_those_that_are_documented(files, capsys):
+    """They stay: programs read them. A new one is added to the page."""
+    page = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
     words = ["run", "grid2", "--seconds", "0.02", "--json", "--out", "here"]
     assert command_line(words) == 0
     printed = json.loads(capsys.readouterr().out)
     with open("here/summary.json") as file:
         assert json.load(file) == printed
+    assert list(printed) == re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
     assert (printed["scene"], printed["frames"]) == ("grid2", 20)
     assert printed["settings"]["arm"] == "touch"  # what auto resolved to
     assert printed["simulated_seconds"] == pytest.approx(0.02)
-
-
-def test_the_keys_of_json_are_those_that_are_documented(files, capsys):
-    """They stay: programs read them. A new one is added to the page."""
-    page = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
-    documented = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
-    assert command_line(["run", "grid2", "--seconds", "0.01", "--json"]) == 0
-    assert list(json.loads(capsys.readouterr().out)) == documented
 
 
 def test_quiet_prints_nothing(files, capsys):
@@ -252,17 +214,9 @@ def test_quiet_prints_nothing(files, capsys):
 
 
 def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):
-    coupling_options = [
-        "--tissue-every",
-        "10",
-        "--coupling",
-        "virtual",
-        "--coupling-stiffness",
-        "900",
-        "--no-passivity",
-    ]
+    coupling_options = "--tissue-every 10 --coupling virtual --coupling-stiffness 900"
     line = ["run", "grid2", "--seconds", "0.5", "--json", "--out", "soft"]
-    assert command_line([*line, *coupling_options]) == 0
+    assert command_line([*line, *coupling_options.split(), "--no-passivity"]) == 0
     summary = json.loads(capsys.readouterr().out)
     settings, counters = summary["settings"], summary["counters"]
     assert (settings["tissue_every"], settings["coupling"]) == (10, "virtual")
@@ -361,17 +315,6 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     assert summary["status"] == f"interrupted by {number.name}"
     assert summary["frames"] == len(read_forces(forces)) >= FRAMES_PER_FLUSH
     assert names_in(folder) == sorted(RUN_FILES)
-
-
-@pytest.mark.end_to_end
-def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
-    program = start("run", "grid2", "--seconds", "1000", "--out", str(tmp_path))
-    forces = tmp_path / "forces.csv"
-    wait_for_rows(program, forces)
-    program.kill()
-    program.communicate(timeout=60)
-    assert np.isfinite(read_forces(forces).rows).all()
-    assert (tmp_path / "initial.vtu").stat().st_size > 0
 
 
 def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):

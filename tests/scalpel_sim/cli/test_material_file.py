@@ -2,7 +2,6 @@ import math
 import re
 import tomllib
 from dataclasses import fields, replace
-from typing import get_args, get_type_hints
 
 import pytest
 
@@ -20,16 +19,15 @@ from tissue import MATERIALS, BladeShape, Material
 WRONG_FILES = {
     "no file": (None, r"cannot be read: No such file.*materials --write"),
     "nothing": ("", r"has no table \[material\]; .*materials --write"),
-    "the name of the option as a key": ("[material]\nyoung = 5e3", "Did you mean 'young_modulus'"),
     "a series that leaves nothing": (
         '[material]\nlaw = "neo_hookean"\nprony = [[0.6, 0.1], [0.5, 1]]',
         r"mine.toml: \[material\]: prony has g whose sum is 1.1",
     ),
-}
-
-WRONG_BLADES = {
-    "the other table alone": ("[material]\ndensity = 1000", r"has no table \[blade\]"),
-    "a bevel that is too steep": ("[blade]\nbevel_degrees = 80", "80 degrees; at most 60"),
+    "no blade": ("[material]\ndensity = 1000", r"has no table \[blade\]"),
+    "a bevel that is too steep": (
+        "[material]\n[blade]\nbevel_degrees = 80",
+        "80 degrees; at most 60",
+    ),
 }
 
 
@@ -48,12 +46,6 @@ def test_the_tables_have_the_fields_of_material_and_blade():
         assert tuple(texts_of(table)) == table.__struct_fields__
 
 
-@pytest.mark.parametrize("table", [MaterialTable, BladeTable])
-def test_each_key_describes_its_values(table):
-    for hint in get_type_hints(table, include_extras=True).values():
-        assert get_args(hint)[0].__metadata__[0].description
-
-
 @pytest.mark.parametrize("name", [None, *MATERIALS])
 def test_what_is_written_reads_back_to_the_same_material_and_blade(name, tmp_path, capsys):
     path = tmp_path / "mine.toml"
@@ -64,13 +56,6 @@ def test_what_is_written_reads_back_to_the_same_material_and_blade(name, tmp_pat
     assert Material(**read_figures(path, "material")) == wanted
     scene = chosen_scene("slab", options(path, blade=path))
     assert (scene.material, scene.blade) == (wanted, SCALPEL)
-
-
-def test_any_material_reads_back_to_the_same_bits(tmp_path):
-    odd = Material(young_modulus=1 / 3 * 1e4, toughness=math.pi, retardation_time=1e-300)
-    path = tmp_path / "odd.toml"
-    path.write_text(template(odd, "an odd one"), encoding="utf-8")
-    assert Material(**read_figures(path, "material")) == odd
 
 
 def test_a_prony_series_reads_back_and_an_option_overrides_it(tmp_path):
@@ -120,31 +105,15 @@ def test_what_cannot_be_written_is_wrong_use(words, expected, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_missing_folder_is_a_failed_run(tmp_path, capsys):
-    assert command_line(["materials", "--write", str(tmp_path / "no" / "mine.toml")]) == 1
-    assert "cannot be written" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("case", WRONG_FILES)
 def test_a_wrong_file_is_named_with_the_key_and_a_remedy(case, tmp_path):
     content, expected = WRONG_FILES[case]
     path = tmp_path / "mine.toml"
     if content is not None:
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        path.write_text(content)
     with pytest.raises(UsageError, match=expected) as caught:
-        chosen_scene("slab", options(path))
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("case", WRONG_BLADES)
-def test_a_wrong_blade_is_named_with_the_key_and_a_remedy(case, tmp_path):
-    content, expected = WRONG_BLADES[case]
-    path = tmp_path / "mine.toml"
-    path.write_text(content)
-    with pytest.raises(UsageError, match=expected) as caught:
-        chosen_scene("organ", options(None, blade=path))
-    assert str(path) in str(caught.value)
+        chosen_scene("organ", options(path, blade=path))
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_wrong_file_gets_one_line_and_exit_code_2(tmp_path, capsys):

@@ -7,15 +7,7 @@ from pathlib import Path
 import pytest
 
 from scalpel_sim.cli.app import app
-from scalpel_sim.cli.options import (
-    ArmOptions,
-    BladeOptions,
-    BodyOptions,
-    MaterialOptions,
-    SolverOptions,
-)
 from scalpel_sim.cli.reference import command_line_reference
-from scalpel_sim.runs.options import ClientOptions, PrintOptions, RunOutputOptions
 
 pytestmark = pytest.mark.skipif(
     int(version("cyclopts").partition(".")[0]) != 5,
@@ -23,16 +15,6 @@ pytestmark = pytest.mark.skipif(
 )
 
 PAGE = Path(__file__).parents[3] / "docs" / "command_line.md"
-
-GROUPS = {
-    "Body": BodyOptions,
-    "Material": MaterialOptions,
-    "Blade": BladeOptions,
-    "Solver": SolverOptions,
-    "Arm": ArmOptions,
-    "Connection": ClientOptions,
-    "Output": (RunOutputOptions, PrintOptions),
-}
 
 
 reference = cache(command_line_reference)
@@ -57,24 +39,6 @@ def test_the_page_does_not_depend_on_the_terminal(monkeypatch):
     assert not re.search(r"/(home|root|tmp|usr)/", at_first)
 
 
-@pytest.mark.parametrize("name", GROUPS)
-def test_run_has_its_options_in_groups(name):
-    options = re.findall(r"\*\*(\w+)\*\*:\n(.*?)(?=\n\*\*|\Z)", section("scalpel-sim run"), re.S)
-    listed = set(re.findall(r"^\* `--([a-z-]+)", dict(options)[name], re.M))
-    classes = GROUPS[name] if isinstance(GROUPS[name], tuple) else (GROUPS[name],)
-    fields = {field for each in classes for field in each.__dataclass_fields__}
-    assert listed == {field.replace("_", "-") for field in fields}
-
-
-@pytest.mark.parametrize("command", ["view", "serve"])
-def test_commands_share_the_groups_that_are_about_the_tissue(command):
-    def part(name: str, of: str) -> str:
-        return re.search(rf"\*\*{name}\*\*:\n(.*?)(?=\n\*\*|\Z)", section(of), re.S).group(1)
-
-    for name in ("Body", "Material", "Blade", "Solver"):
-        assert part(name, f"scalpel-sim {command}") == part(name, "scalpel-sim run")
-
-
 def examples() -> list[str]:
     """Return the commands that the page shows, without the usage of each."""
     page = PAGE.read_text(encoding="utf-8")
@@ -94,7 +58,3 @@ def test_an_example_is_a_command(example):
     command, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
     _, parts, _ = app.parse_commands(words)
     assert command is parts[-1].default_command
-
-
-def test_there_is_no_seed_because_nothing_is_random():
-    assert "--seed" not in reference()

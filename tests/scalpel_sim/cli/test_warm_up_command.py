@@ -6,7 +6,7 @@ import json
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
+from scalpel_sim.errors import EXIT_OK
 from scalpel_sim.runs import console
 from scalpel_sim.runs.options import PrintOptions
 from tissue.support import cache_directory, n_compiled_kernels
@@ -19,11 +19,6 @@ def test_it_prints_the_folder_that_holds_the_kernels(capsys):
     assert printed["folder"].startswith(printed["root"])
     assert printed["kernels"] == n_compiled_kernels() > 100
     assert printed["bytes"] > 1e6
-
-
-def test_an_unknown_scene_is_refused(capsys):
-    assert command_line(["warm-up", "grid3"]) == EXIT_WRONG_USE
-    assert "grid2" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -100,14 +100,6 @@ def test_a_jump_is_refused_and_the_blade_rests_where_it_is(hand, jump):
     assert hand.is_engaged and (again == before[-1]).all()
 
 
-def test_a_stylus_that_lets_go_and_takes_hold_elsewhere_moves_nothing(hand):
-    before = led_by(hand, 50, lambda k: pose(y=k * 1e-4))
-    hand.servo_cp(pose(y=5e-3), holds=False)
-    released = poses(hand, 50, 50)
-    engaged = led_by(hand, 50, lambda k: pose(5.0, 5.0, 5.0), 100)
-    assert (released == before[-1]).all() and (engaged == before[-1]).all()
-
-
 def test_a_silent_device_lets_go_after_the_time_of_the_watchdog(hand):
     led_by(hand, 50, lambda k: pose(y=k * 2e-4))
     hand._clock.now += WATCHDOG

@@ -78,12 +78,3 @@ def test_a_run_that_nobody_has_led_leaves_no_files(tmp_path):
     assert (
         not (tmp_path / "out" / SUMMARY).exists() or summary(tmp_path / "out")["scene"] == "grid7"
     )
-
-
-def test_a_run_that_cannot_begin_is_refused_with_a_reason_and_the_page_stays(tmp_path):
-    with LiveView("grid2", tmp_path / "out") as view:
-        view.wait_for_files()
-        asyncio.run(say(view, begin(scene="no-such-scene")))
-        asyncio.run(say(view, begin(scene="grid7")))
-        view.wait_for_files()
-    assert summary(tmp_path / "out-2")["scene"] == "grid7"

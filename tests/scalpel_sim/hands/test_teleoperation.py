@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
-from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
+from scalpel_sim.hands.commands import LONGEST_SILENCE, Engage, Release, StillThere
 from scalpel_sim.hands.limited_pose import (
     ARRIVED,
     FARTHEST_AHEAD,
@@ -15,24 +15,19 @@ from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.instruments.scene_arms import ROOM
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.runs.file_names import STROKE
-from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
 from tests.scalpel_sim.hands.driven_runs import (
     DT,
-    GRID2,
     ROUNDING,
     Clock,
-    controls_of,
-    done,
     led,
     move,
     poses,
-    through_the_body,
     turn,
 )
-from tests.support.run_files import assert_same_rows, assert_same_run
+from tests.support.run_files import assert_same_rows
 
 ROBOT = read_scene(Path(__file__).parents[3] / "docs" / "examples" / "robot.toml")
 """A scene with an arm of its own."""
@@ -144,30 +139,6 @@ def test_poses_at_rest_take_no_rows(hand):
     hand.commands += [Engage(), move(y=1e-3)]
     poses(hand, 1000, 1000)
     assert 10 < len(hand.blade.take_rows()) < 400
-
-
-def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
-    scene = changed(GRID2, relaxation="verlet")
-    simulation, hand = led(scene)
-    command = through_the_body(hand)
-
-    def every_frame(now):
-        command(now)
-        if len(now.recording) == 700:
-            hand.commands.append(End())
-
-    done(
-        simulation,
-        tmp_path / "led",
-        every_frame=every_frame,
-        controls=controls_of(simulation, hand),
-    )
-    assert simulation.result.cut_area > 1e-3
-    assert simulation.time == pytest.approx(0.7 + REST_AFTER_STROKE, abs=2e-3)
-
-    repeated = prepare(changed(scene, stroke=str(tmp_path / "led" / STROKE)))
-    done(repeated, tmp_path / "again")
-    assert_same_run(tmp_path / "led", tmp_path / "again")
 
 
 @pytest.mark.parametrize("scene", [SCENES["incision"], ROBOT], ids=lambda scene: scene.name)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from bridge import TissueFrame
 from scalpel_sim import Grip
 from scalpel_sim.instruments.grip import GripError
-from tissue import BladeSegment, BladeSweep, Material, Tissue, block, fixed_nodes
+from tissue import Material, Tissue, block, fixed_nodes
 
 DT = 1e-3
 JAWS = """
@@ -125,38 +125,6 @@ def test_a_body_that_lets_go_feels_nothing_more():
     grip.release()  # once more does nothing
     advance(model, data, tissue, [grip], 50)
     assert tissue.snapshot().velocities[:, 2].mean() < -0.3  # it falls
-
-
-def test_the_blade_cuts_between_two_grips_and_the_gap_is_how_far_they_were_moved_apart():
-    stretch = 4e-3
-    model, data = jaws((0, 0.0125, 0.0125), (0.08, 0.0125, 0.0125), (1, 0, 0))
-    tissue = Tissue(BAR, GEL, gravity=(0.0, 0.0, 0.0))
-    grips = [
-        Grip(data, side, tissue, side, stiffness=4e4, damping=40.0) for side in ("left", "right")
-    ]
-    data.ctrl[:] = -0.5 * stretch, 0.5 * stretch
-    advance(model, data, tissue, grips, 1500)
-    moved = data.qpos[1] - data.qpos[0]
-    tension = grips[0].wrench.force[0]
-    assert tension > 0.1 and grips[1].wrench.force[0] == pytest.approx(-tension, rel=1e-3)
-
-    up = np.array([0.0, 0.0, 0.065])
-
-    def pose(t):
-        tip = np.array([0.04, -0.015 + 0.055 * t, -0.02])
-        return BladeSegment(tip, tip + up, np.array([0.0, 1.0, 0.0]))
-
-    advance(
-        model, data, tissue, grips, 600, lambda i: BladeSweep(pose(i / 600), pose((i + 1) / 600))
-    )
-    advance(model, data, tissue, grips, 1500)
-    moved = data.qpos[1] - data.qpos[0]
-    assert [len(tissue.pieces()), *(grip.n_points for grip in grips)] == [2, 9, 9]
-    np.testing.assert_allclose([grip.wrench.force[0] for grip in grips], 0.0, atol=5e-3)
-    body = tissue.snapshot()
-    lips = body.positions[np.abs(body.rest_positions[:, 0] - 0.04) < 1e-3][:, 0]
-    gap = lips[lips > lips.mean()].mean() - lips[lips < lips.mean()].mean()
-    assert gap == pytest.approx(moved, rel=0.05)
 
 
 @pytest.mark.parametrize("size", [np.nan, 1e6])

@@ -91,21 +91,12 @@ def both(one, other):
 
 FORCES_DAMAGES = {
     "numbers of row 60": both(with_cell(60, "force_x_n", WRONG), with_cell(60, "frame_s", WRONG)),
-    "numbers of the last row": both(
-        with_cell(-1, "tip_x_m", WRONG), with_cell(-1, "frame_s", WRONG)
-    ),
     "no number": with_cell(60, "force_x_n", "word"),
     "a row removed": with_rows(lambda rows: rows[:60] + rows[61:]),
-    "a row doubled": with_rows(lambda rows: rows[:61] + rows[60:]),
-    "cut short": half,
-    "emptied": nothing,
 }
 REPLAY_DAMAGES = {
     "one bit": with_bits(1),
-    "40 bytes": with_noise(40),
-    "100 bits": with_bits(100),
     "cut short": half,
-    "emptied": nothing,
 }
 
 

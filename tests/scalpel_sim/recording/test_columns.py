@@ -72,10 +72,3 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
     assert row[25:31] == [stiffness[at] for at in AXES]
     assert row[31:36] == [1.0, 2.0, 3, 4.0, 5.0]
     assert row[-6:-1] == list(range(5)) and np.isnan(row[36:-6]).all()
-
-
-def test_a_wrench_that_no_limit_changed_is_written_twice():
-    rng = np.random.default_rng(0)
-    wrench, blade = Wrench(*rng.normal(size=(3, 3))), BladeSegment(*np.eye(3))
-    row = row_of(0.0, blade, wrench, wrench, result_of(rng, 2), TissueFrame())
-    assert row[4:10] == row[10:16] == [*wrench.force, *wrench.torque]

@@ -2,27 +2,11 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
-from scalpel_sim.recording.columns import EDGE_COSINE, force_parts, shared_columns
+from scalpel_sim.recording.columns import EDGE_COSINE, force_parts
 from scalpel_sim.scene.scene import changed
 from tissue import RigidContacts
 
 FORWARD = np.array([0.0, 1.0, 0.0])
-
-
-def test_the_parts_are_the_force_of_the_edge_the_pressure_on_the_faces_and_friction():
-    """A sample of the edge resists with 2 N; faces are pressed by 3 N, one has friction of 1 N."""
-    contacts = RigidContacts(
-        point=np.zeros((3, 3)),
-        normal=np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
-        normal_force=np.array([2.0, 3.0, 3.0]),
-        friction=np.array([[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]),
-        cut_area=np.zeros(3),
-        geom=np.full(3, -1),
-    )
-    parts = force_parts(contacts, FORWARD)
-    assert parts.edge == pytest.approx([-0.5, -2.0, 0.0])
-    assert parts.pressing == pytest.approx([0.0, 0.0, 0.0])
-    assert parts.friction == pytest.approx([0.0, -1.0, 0.0])
 
 
 def test_the_face_of_the_steepest_bevel_does_not_count_as_edge():
@@ -67,20 +51,3 @@ def test_the_parts_of_each_frame_add_up_to_the_force_at_its_end(cut):
     assert all(np.abs(part).max() > 1e-3 for part in recorded)
     there = simulation.frame.vectors_to_world(np.array(forces))
     assert sum(recorded) == pytest.approx(there, abs=1e-9)
-
-
-def test_the_stiffness_of_each_frame_is_that_of_the_tissue_in_the_world(cut):
-    simulation, _ = cut
-    last = simulation.recording.rows[-1]
-    assert simulation.recording.column("stiffness_yy_n_m").max() > 100.0
-    there = simulation.result.stiffness[:3, :3]  # the frames are parallel
-    first = shared_columns().index("stiffness_xx_n_m")
-    assert last[first : first + 3] == pytest.approx(np.diag(there), rel=1e-12)
-
-
-def test_the_energy_account_of_each_frame_is_in_the_table_and_closes(cut):
-    recording = cut[0].recording
-    assert recording.is_audited
-    work = recording.column("work_of_blade_j")[-1]
-    assert recording.column("friction_j")[-1] > 0.0
-    assert abs(recording.column("residual_j")[-1]) < 0.005 * work

@@ -90,20 +90,12 @@ def test_what_is_compiled_ahead_is_done_to_its_end(kernels, job):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_first_run_compiles_in_two_processes_and_waits_for_them(started):
-    shown = []
-    compile_ahead([SMALL], lambda done, total: shown.append((done, total)))
-    assert [process.args[3] for process in started] == ["motion", "cut"]
-    assert [process.returncode for process in started] == [0, 0]
-    assert kernels_are_compiled(SMALL)
-    assert all(done <= total for done, total in shown)
-    assert shown[-1][0] == shown[-1][1] > 100
-
-
 def test_sets_are_compiled_one_first_and_the_others_in_shares_by_all_cores(started, monkeypatch):
+    """The first in two processes. All are waited for, and the progress ends with all kernels."""
+    shown = []
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
     others = [SMALL._replace(audit=not SMALL.audit), SMALL._replace(relaxation="verlet"), SMALL]
-    compile_ahead([SMALL, *others])
+    compile_ahead([SMALL, *others], lambda done, total: shown.append((done, total)))
     asked = [
         (process.args[3], [KernelSet(*json.loads(each)) for each in process.args[4:]])
         for process in started
@@ -115,6 +107,9 @@ def test_sets_are_compiled_one_first_and_the_others_in_shares_by_all_cores(start
         ("all", [others[1]]),
     ]
     assert [process.returncode for process in started] == [0] * 4
+    assert kernels_are_compiled(SMALL)
+    assert all(done <= total for done, total in shown)
+    assert shown[-1][0] == shown[-1][1] > 100
 
 
 def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started):

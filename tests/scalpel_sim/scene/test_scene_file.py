@@ -103,15 +103,6 @@ def test_files_of_a_scene_are_found_from_where_it_is_written(tmp_path, monkeypat
     assert len(scene_in(read_scene_file(tmp_path / "out" / "scene.toml")).mesh().tetrahedra) == 1
 
 
-def test_a_run_can_be_done_again_from_its_folder(tmp_path):
-    first, again = tmp_path / "first", tmp_path / "again"
-    words = ["run", "grid2", "--set", "stroke.0.kind=curved", "--toughness", "15", "-q"]
-    assert command_line([*words, "--seconds", "0.3", "--out", str(first)]) == 0
-    assert command_line(["run", str(first / "scene.toml"), "-q", "--out", str(again)]) == 0
-    for name in ("scene.toml", "final.vtu"):
-        assert (first / name).read_bytes() == (again / name).read_bytes()
-
-
 # Layers
 
 

@@ -55,7 +55,6 @@ WRONG = {
     "brackets in brackets": ("9.81", "[" * 100_000, "its brackets are nested too deep"),
     "tables in tables": ("gravity", "gravity" + ".a" * 500_000, "has more than 20 parts"),
     "thousands of digits": ("9.81", "1" * 5_000, "an integer in it has thousands of digits"),
-    "as many, counted by 16": ("9.81", "0x" + "F" * 5_000, "gravity is too long to be shown"),
     "no body": (FILE[FILE.index("[body]") : FILE.index("[material]")], "", "has no [body]"),
     "no shape": ('shape = "block"\n', "", "[body] has no shape"),
     "an unknown table": ("[world]", "[wrld]", "Did you mean 'world'"),
@@ -65,17 +64,10 @@ WRONG = {
     "an unknown shape": ('"block"\nsize', '"blok"\nsize', 'must be "organ" or "block" or'),
     "a block with a radius": ("cells =", "radius = 0.1\ncells =", 'belongs to shape "cylinder"'),
     "a flat body": ("0.04, 0.04, 0.04", "0.04, 0.04, 0.0", "three numbers above 0"),
-    "a mesh that is not there": (
-        'shape = "block"\nsize = [0.04, 0.04, 0.04]\ncells = [2, 2, 2]',
-        'shape = "mesh"\nfile = "no.msh"',
-        "no.msh",
-    ),
     "an unknown side": ('"left,right"', '"left,rigth"', "rigth"),
     "a box without nodes": ('"left,right"', '"1,1,1:2,2,2"', "no node"),
     "a stretch of nothing": ('"left,right"', '"bottom"\nstretch = 0.1', "opposite sides"),
     "a negative modulus": ("1e4", "-1e4", "young_modulus is -10000.0; it must be a number above"),
-    "no stiffness": ("young_modulus = 1e4\n", "", "needs a preset, or a law and a young_modulus"),
-    "an unknown preset": ('law = "neo_hookean"', 'preset = "livr"', "Did you mean 'liver'"),
     "a ratio of a half": ("1e4", "1e4\npoisson_ratio = 0.5", "from 0 to below 0.5"),
     "relaxation of springs": (
         '"neo_hookean"',
@@ -83,15 +75,7 @@ WRONG = {
         "[material]: prony is given with law springs",
     ),
     "a line with a height": ("4e-4", "0.0\nheight = 0.01", "[blade]: it has thickness 0"),
-    "a thick blade": ("4e-4", "4e-4\nbevel_degrees = 80", "80 degrees"),
     "an unknown relaxation": ('"global"', '"globl"', "Did you mean 'global'"),
-    "a guard of one": ('"global"', '"global"\nguard = 1.0', "[solver]: guard is 1.0"),
-    "an unknown arm": ('"touch"', '"tuch"', "Did you mean 'touch'"),
-    "a rigid coupling with a spring": (
-        '"touch"',
-        '"touch"\ncoupling_stiffness = 5.0',
-        "coupling virtual",
-    ),
     "an unknown stroke": ('"points"', '"point"', "Did you mean 'points'"),
     "a key of another stroke": ("length =", "depth = 0.01\nlength =", 'belongs to kind "incision"'),
     "a stroke without a length": ("length = 0.05\n", "", 'of kind "points" has no length'),
@@ -105,7 +89,6 @@ WRONG = {
     "a stroke along its edge": ("[0.02, 0.05, 0.01]", "[0.02, -0.01, 0.03]", "give the direction"),
     "a stroke beside the body": ("0.02, -0.01, 0.01], [0.02", "0.2, -0.01, 0.01], [0.2", "mm away"),
     "an attachment of nothing": ('"top"', '"sphere:1,1,1,0.01"', "no node is in the sphere"),
-    "an attachment of a side of nobody": ('"top"', '"tpo"', "Did you mean 'top'"),
     "an attachment in single brackets": (ATTACHED[0], "[attachment]\n", "it must be tables: [[att"),
     "a ligament without a toughness": (ATTACHED[2], TIED, "has to and no toughness"),
     "a toughness of no ligament": (ATTACHED[2], "toughness = 5.0\n" + ATTACHED[2], "and no to;"),
@@ -151,11 +134,6 @@ WRONG = {
         'model = "arm.xml"',
         "has a model and no at",
     ),
-    "a model that is not there": (
-        'holds = "attachment"',
-        'model = "no.xml"\nat = "flange"',
-        "no.xml",
-    ),
     "a name with a space": ('"helper"', '"my left"', "letters, digits and underscores"),
     "two graspers of one name": (
         "[[stroke]]",
@@ -172,7 +150,6 @@ motion = [{ time = 0.0, at = [0.0, 0.0, 0.1], opening = 0.01 }]
         "[[view]] number 1 looks along its up, [0.0, 0.0, 1.0]; give another up, such as [0, 1, 0]",
     ),
     "an up of no direction": ("fov_degrees", "up = [0, 0, 0]\nfov_degrees", "up is [0, 0, 0]"),
-    "an eye out of this world": ("[0.2, -0.2, 0.2]", "[1.7e308, 1.7e308, 0]", "too large"),
     "a view of everything": ("= 40.0", "= 180.0", "an angle above 0 and below 180 degrees"),
     "a view of two lines": ('"side"', '"a\\nb"', "a name of one line"),
     "an hour and more": ("about", "seconds = 4000.0\nabout", "at most 3600"),
@@ -181,8 +158,6 @@ motion = [{ time = 0.0, at = [0.0, 0.0, 0.1], opening = 0.01 }]
         '"global"\ncontact = "penalty"',
         "[solver] contact: contact is always by forces since version 0.2",
     ),
-    "two arms": ('"touch"', '"touch"\nmodel = "arm.xml"', "[arm] has a preset and a model"),
-    "a tip of no arm": ('"touch"', '"auto"\ntip = "end"', "[arm] tip is for an arm of your own"),
 }
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint, least_jerk
 
 DOWN, X, Y = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -55,17 +54,3 @@ def test_it_turns_about_one_axis_and_a_slanted_across_is_straightened():
     along = stroke.pose(1.0).tip - stroke.pose(1.0).heel
     assert along / 0.02 == pytest.approx((0.0, np.sqrt(0.5), -np.sqrt(0.5)), abs=1e-6)
     assert stroke.pose(1.5).forward == pytest.approx(np.cross(Y, X), abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("second", "expected"),
-    [
-        (START, r"time 0\.5 s follows 0\.5 s in waypoint 3; times must increase"),
-        (START._replace(time=1.0, across=DOWN), "at 1 s: .* not along one line"),
-        (START._replace(time=1.0, approach=(0.0, 0.0, 0.0)), "not along one line"),
-        (START._replace(time=0.6, at=(1.0, 0.0, 0.1)), "2 m/s is the limit"),
-    ],
-)
-def test_what_no_grasper_can_follow_is_refused(second, expected):
-    with pytest.raises(StrokeError, match=expected):
-        GraspMotion([START, second], "left").stroke(0.01, 0.01)

@@ -42,8 +42,3 @@ def test_a_stroke_that_is_added_is_planned_and_checked_as_the_others():
         changed(scene, strokes=(StrokeTable(kind="circle", points=[(0, 0, 0)], length=0.05),))
     with pytest.raises(UsageError, match='has the key depth, which belongs to kind "incision"'):
         changed(scene, depth=0.01)
-
-
-def test_without_it_the_stroke_is_unknown():
-    with pytest.raises(UsageError, match="circle"):
-        changed(SCENES["slab"], strokes=(CIRCLE,))

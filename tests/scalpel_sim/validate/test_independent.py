@@ -101,7 +101,3 @@ def test_the_blade_pays_for_half_of_what_is_cut_more_than_swept():
 def test_a_deep_insertion_that_is_not_steady_fails():
     assert verdicts(liver.check_deep_insertion(164.0, 1.0)) == [PASS, PASS]
     assert verdicts(liver.check_deep_insertion(1.06 * 164.0, 1.12)) == [FAIL, FAIL]
-
-
-def test_the_observer_of_the_bridge_is_a_regression():
-    assert coupling.check_least_energy("holds", 1, 0.0).basis == REGRESSION

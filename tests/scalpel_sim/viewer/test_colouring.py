@@ -25,12 +25,10 @@ def test_the_run_is_told_where_the_sum_of_what_pages_show_changes():
 @pytest.mark.parametrize(
     "message",
     [
-        "",
         "drawn",
         b"\xff",
         '{"type": "colour"}',
         '{"type": "colour", "quantity": "heat"}',
-        '{"type": "colour", "quantity": "stress", "more": 1}',
         '{"type": "move", "quantity": "stress"}',
         '{"type": "colour", "quantity": ' + 100 * " " + '"stress"}',
     ],

@@ -125,14 +125,6 @@ def test_a_key_goes_through_the_quantities_and_one_that_is_missing_is_named(tab)
     assert tab.inner_text("#scale-title") == "displacement [mm]: not in this picture yet"
 
 
-def test_the_cut_alone_keeps_its_colours_in_a_faint_skin(tab):
-    tab.select_option("#quantity", "stress")
-    seen_between_lips = n_pixels(tab, "cut")
-    tab.keyboard.press("c")
-    assert n_pixels(tab, "cut") > 3 * seen_between_lips
-    assert tab.evaluate("sceneView.tissue.get('skin').mesh.material.opacity") < 0.5
-
-
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844), (844, 390), (700, 600)])
 def test_no_panels_overlap_on_a_wide_a_narrow_and_a_low_screen(tab, size):
     width, height = size

@@ -49,15 +49,10 @@ def attachment_packed():
     ("change", "why"),
     [
         ({"where__region": None}, "either on a region, or on nodes, or on points"),
-        ({"where__region": ""}, "either on a region, or on nodes, or on points"),
         ({"where__nodes": raw(1, dtype="<i8")}, "either on a region, or on nodes, or on points"),
         ({"where": {"nodes": raw(-1, dtype="<i8")}}, "nodes -1 to -1"),
         ({"where": {"points": raw(0.0, 0.0, 1e9)}}, "a point is not within 1000 m"),
-        ({"where": {"points": raw(0.0, np.nan, 0.0)}}, "a point is not within 1000 m"),
-        ({"where": "top"}, "Expected `object`"),
         ({"stiffness": np.inf}, "stiffness"),
-        ({"stiffness": np.nan}, "stiffness"),
-        ({"damping": 1e300}, "damping"),
         ({"breaks_at": np.nan}, "breaks_at"),
         ({"origin": raw(0.0, 0.0)}, "origin has 16 bytes; wanted 24"),
         ({"origin": raw(0.0, 0.0, np.inf)}, "the origin of a frame is not within"),
@@ -75,8 +70,6 @@ def test_an_attachment_with_one_wrong_part_is_refused_by_name(change, why):
         ({"to": b""}, "strands without an end"),
         ({"to": raw(0.0, 0.0, 2e3)}, "the end of a strand is not within"),
         ({"area": np.nan}, "area"),
-        ({"toughness": 1e10}, "toughness"),
-        ({"rest_length": np.inf}, "rest_length"),
     ],
 )
 def test_a_tie_with_one_wrong_part_is_refused_by_name(change, why):
@@ -114,14 +107,10 @@ def ball_packed(n=1):
     [
         ({"geoms__0__size": [-0.01]}, r"> 0.0.*\$.geoms\[0\].size"),
         ({"geoms__0__size": [1e4]}, r"<= 1000.0.*\$.geoms\[0\].size"),
-        ({"geoms__0__size": ["wide"]}, r"Expected `float`"),
-        ({"geoms__0__friction": None}, r"Expected `float`.*friction"),
         ({"geoms__0__friction": np.inf}, r"friction"),
         ({"poses": raw(0, 0, 2000, 1, 0, 0, 0, 1, 0, 0, 0, 1)}, "geom 0 is not within 1000 m"),
-        ({"poses": raw(*range(11))}, "poses has 88 bytes; wanted 0"),
         ({"poses": b""}, "0 poses of 1 geoms"),
         ({"poses": raw(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, -1)}, "axes of geom 0 are no rotation"),
-        ({"poses": raw(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 2)}, "axes of geom 0 are no rotation"),
         ({"geoms__0__vertices": raw(1.0, 2.0)}, "vertices has 16 bytes"),
         (
             {"geoms__0__vertices": raw(0.0, np.nan, 0.0)},

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bridge.tcp.messages.encoding import Count, Many, Message, Record
-from bridge.tcp.wire import LARGEST_REPLY, MessageError
+from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
 from tests.bridge.changed_messages import changed, raw
 from tissue import BoolArray, FloatArray, IntArray
@@ -84,13 +84,10 @@ def test_numbers_of_numpy_are_numbers_and_other_types_of_arrays_are_converted():
         ({"numbers": b"\0" * 15}, "numbers has 15 bytes; wanted 16"),
         ({"flags": b"\0\1\2"}, "a flag of flags is neither 0 nor 1"),
         ({"inner__array": raw(1.0)}, "array has 8 bytes; wanted 16"),
-        ({"many__1__array": b""}, "array has 0 bytes; wanted 16"),
         ({"many": [{"number": 0.0, "array": raw(0.0, 0.0)}] * 3}, "length <= 2.*many"),
         ({"count": -1}, r">= 0 .*count"),
-        ({"count": LARGEST_REPLY + 1}, r"<= .*count"),
         ({"count": 1.5}, "Expected `int`"),
         ({"text": b"\xff"}, "Expected `str`"),
-        ({"rows": [[0.0, 0.0, 0.0]]}, "Expected `bytes`"),
         ({"colour": "red"}, "unknown field `colour`"),
         ({"inner": {"number": 0.0}}, "missing required field `array`"),
     ],
@@ -106,16 +103,13 @@ def test_a_message_with_one_wrong_part_is_refused_by_name(change, why):
     "payload",
     [
         b"",
-        b"\x80",
         b"\xc1",
         b"\xdf\xff\xff\xff\xff",
-        b"\xdd\xff\xff\xff\xff",
         b"\x81\xa1\xff\xc0",
         b"\x81\xa4text\xa1\xff",
         b"\x81\xa4rows\xc6\xff\xff\xff\xff",
         b"\x81\xa4many\xdd\xff\xff\xff\xff",
         b"\x81\xa4rows" + b"\x91" * 100_000,
-        b"\x91" * 100_000,
     ],
 )
 def test_bytes_that_promise_more_or_end_early_are_refused(payload):
