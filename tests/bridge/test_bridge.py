@@ -61,13 +61,6 @@ def test_nothing_is_felt_out_of_contact_and_the_tissue_still_advances(block_tiss
     assert bridge.counters.frames == bridge.counters.rejected == 20
 
 
-def test_a_blade_that_is_drawn_into_the_block_is_pushed_back(block_tissue, upright):
-    bridge = Bridge(InProcessLink(block_tissue()))
-    felt = draw(bridge, upright, 60)
-    assert felt[-1].force[1] < -0.01
-    np.testing.assert_allclose(felt[-1].force, -bridge.result.force_on_tissue, atol=1e-9)
-
-
 def test_a_bridge_takes_a_tissue_as_it_is(block_tissue, upright):
     tissue = block_tissue()
     itself, linked = Bridge(tissue), Bridge(InProcessLink(block_tissue()))

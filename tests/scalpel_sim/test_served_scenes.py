@@ -5,16 +5,14 @@ import json
 import pytest
 
 from bridge import InProcessLink, LinkError, SceneView
-from scalpel_sim import prepare, read_scene
+from scalpel_sim import read_scene
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scene.served import scene_of
-from scalpel_sim.viewer import replay
 from tests.scalpel_sim.served_scenes import address_of_server, served
 from tests.support.run_files import assert_same_run
 
@@ -104,23 +102,6 @@ def test_a_client_that_does_not_know_the_scene_has_its_views(path):
     assert found.name == "mine" and found.views == scene.views and len(found.views) == 1
 
 
-def test_the_replay_of_a_run_with_its_tissue_elsewhere_offers_the_views_of_the_server(
-    path, tmp_path, monkeypatch
-):
-    offered = []
-    packets = replay.ScenePackets
-
-    def noted(*given, views, **others):
-        offered.append(views)
-        return packets(*given, views=views, **others)
-
-    monkeypatch.setattr(replay, "ScenePackets", noted)
-    address = address_of_server(read_scene(path))
-    words = ["run", "--connect", address, "--seconds", "0.01", "-q", "--out", str(tmp_path)]
-    assert command_line(words) == 0
-    assert offered == [read_scene(path).views]
-
-
 @pytest.mark.parametrize(
     ("view", "said"),
     [
@@ -133,13 +114,6 @@ def test_a_view_that_shows_nothing_is_refused_with_the_name_of_who_sent_it(view,
     link = InProcessLink(make_tissue(SCENES["grid2"]), "grid2", [SceneView(*view)])
     with pytest.raises(LinkError, match=f"the server sends a view that cannot be used: .*{said}"):
         scene_of(link)
-
-
-def test_a_scene_is_not_put_around_the_body_of_another():
-    link = InProcessLink(make_tissue(SCENES["grid2"]), "grid2")
-    with pytest.raises(UsageError, match="the body there is that of 'grid2', not of 'slab'"):
-        scene_of(link, SCENES["slab"])
-    assert prepare(scene_of(link, SCENES["grid2"]), link).link is link
 
 
 def test_a_name_with_a_dot_is_that_of_its_scene_over_a_link():

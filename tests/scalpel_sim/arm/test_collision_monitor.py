@@ -63,13 +63,6 @@ def test_an_instrument_that_is_folded_back_on_the_arm_is_found():
     assert not any(other in ("wrist", "gimbal", "stylus") for _, other in touched)
 
 
-@pytest.mark.parametrize("scene", ["grid2", "slab"])
-def test_in_the_scenes_nothing_is_touched(scene):
-    simulation = prepare(SCENES[scene])
-    simulation.run(0.02)
-    assert simulation.touching.frames == {}
-
-
 def test_a_blade_that_is_led_below_the_floor_meets_it_and_is_stopped(caplog):
     points = [[0.02, -0.005, 0.005], [0.02, -0.005, -0.006], [0.02, 0.02, -0.006]]
     drawn = StrokeTable(kind="points", points=points, length=0.06, forward=[0.0, 1.0, 0.0])

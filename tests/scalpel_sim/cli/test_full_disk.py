@@ -10,7 +10,6 @@ WORDS = {
     "key": ("key", "/mnt/new.key"),
     "scene": ("new", "/mnt/new.toml"),
     "material": ("materials", "--write", "/mnt/new.toml"),
-    "figure": ("figure", "11", "--output", "/mnt/new.png"),
 }
 
 pytestmark = pytest.mark.usefixtures("small_disks")

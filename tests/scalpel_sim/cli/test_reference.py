@@ -20,18 +20,13 @@ PAGE = Path(__file__).parents[3] / "docs" / "command_line.md"
 reference = cache(command_line_reference)
 
 
-def section(title: str) -> str:
-    """Return the section about one command."""
-    return re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", reference(), re.S | re.M).group(1)
-
-
 def test_the_page_of_the_command_line_is_that_of_the_program():
     """To renew it: `python -m scalpel_sim.cli.reference > docs/command_line.md`."""
-    assert PAGE.read_text(encoding="utf-8") == command_line_reference()
+    assert PAGE.read_text(encoding="utf-8") == reference()
 
 
 def test_the_page_does_not_depend_on_the_terminal(monkeypatch):
-    at_first = command_line_reference()
+    at_first = reference()
     monkeypatch.setenv("COLUMNS", "33")
     monkeypatch.setenv("TERM", "dumb")
     monkeypatch.setattr("sys.argv", ["/somewhere/else/python", "-x"])

@@ -1,12 +1,11 @@
 """A fake device at 1 kHz leads a run over a real socket, and misbehaves."""
 
-import socket
 import time
 
 import numpy as np
 import pytest
 
-from bridge import DeviceClient, parse_address
+from bridge import DeviceClient
 from scalpel_sim.hands.commands import Pause, Reset, Resume
 from tests.scalpel_sim.hands.device_runs import (
     UNTURNED,
@@ -173,10 +172,3 @@ def test_half_a_message_does_not_keep_the_blade_led(run):
 
     run.run_beside(act)
     assert run.led_after(stopped_at[0]) <= SAFE_WITHIN
-
-
-def test_a_connection_that_says_nothing_delays_no_frame_and_leads_nothing(run):
-    run.frames.clear()
-    with socket.create_connection(parse_address(run.address)):
-        run.run(0.2)
-    assert not any(frame.is_engaged for frame in run.frames)

@@ -159,7 +159,7 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
     assert_same_rows(simulation.recording, repeated.recording)
 
 
-@pytest.mark.parametrize("name", ["retract", "excise", "taut_incision"])
+@pytest.mark.parametrize("name", ["excise", "taut_incision"])
 def test_scenes_of_two_hands_have_room_for_both_from_their_start_on(name):
     simulation = prepare(SCENES[name], is_led=True)
     start, (grasper,) = simulation.stroke.start, simulation.graspers

@@ -125,21 +125,6 @@ def test_a_file_that_was_removed_is_made_again(names, folder, whole, resume):
     expect_same(folder, whole)
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        with_noise(1),
-        with_rows(lambda rows: [b"a,b\n", *rows[1:]]),
-        with_rows(lambda rows: rows[:30] + rows[:1] + rows[30:]),
-    ],
-    ids=["no text", "other columns", "a first line in the middle"],
-)
-def test_rows_are_read_no_further_than_they_are_whole(damage, folder, killed):
-    change(folder / FORCES, damage)
-    kept = resumption_of(folder).forces.n_bytes
-    assert (killed / FORCES).read_bytes().startswith((folder / FORCES).read_bytes()[:kept])
-
-
 def test_a_replay_that_was_damaged_late_costs_no_more_than_the_last_checkpoint(folder):
     n_bytes = read_checkpoint(checkpoints(folder)[1]).mark.written[REPLAY_FRAMES].n_bytes
     change(folder / REPLAY_FRAMES, lambda data: data[:n_bytes] + bytes(len(data) - n_bytes))

@@ -75,10 +75,6 @@ def test_states_go_with_the_forces_and_their_limits(found):
         assert each.state == "slides" or each.friction <= each.limit * (1.0 + 1e-9)
 
 
-def test_supports_hold_what_the_blade_pulls_and_the_weight(found):
-    assert {each.state for each in found.of_kinds("support")} == {"holds"}
-
-
 def test_the_command_prints_all_as_json_and_changes_no_file(folder, found, capsys):
     before = sums_of(folder)
     printed = json_of(folder, capsys)

@@ -119,11 +119,6 @@ WRONG = {
         "time = 9.0, at = [2, 0, 0], ",
         "does not reach the whole motion of 'helper'",
     ),
-    "a grasper in the way": (
-        "at = [0.1, 0.02, 0.03], approach = [-1, 0, 0]",
-        "at = [0.03, 0.02, 0.09], approach = [0, 0, -1]",
-        "not clear of the other arm",
-    ),
     "a place without a model": (
         'holds = "attachment"',
         'at = "flange"',

@@ -184,13 +184,6 @@ def test_an_invalid_speed_is_refused(speed):
         plan_stroke("straight", BODIES["slab"](), speed=speed)
 
 
-@pytest.mark.parametrize("body", ["slab", "organ", "sheet on edge"])
-@pytest.mark.parametrize("name", PLANNED)
-def test_planned_strokes_meet_the_body(body, name):
-    mesh = BODIES[body]()
-    check_meets(plan_stroke(name, mesh), mesh)
-
-
 def shifted(stroke, shift):
     poses = [
         pose._replace(tip=pose.tip + shift, heel=pose.heel + shift)

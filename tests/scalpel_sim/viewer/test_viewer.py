@@ -84,11 +84,6 @@ def test_a_foreign_name_that_points_here_is_not_served(viewer):
     assert status(viewer.url, Host="evil.example") == 404
 
 
-def test_a_given_port_that_is_in_use_is_an_error_that_names_it(viewer):
-    with pytest.raises(RunError, match=f"port {port_of(viewer)} is in use"):
-        Viewer(little_arm()[0], port=port_of(viewer))
-
-
 def test_without_a_given_port_the_next_free_one_is_taken(viewer):
     with Viewer(little_arm()[0]) as second:
         assert port_of(second) != port_of(viewer)
