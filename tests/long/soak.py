@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.strokes import random_stroke
-from bridge import LinkError, TcpLink
+from bridge import LinkError, TcpLink, serve
 from scalpel_sim import SCENES, Simulation, Viewer, prepare
 from scalpel_sim.hands.commands import Engage, Move, Turn
 from scalpel_sim.hands.teleoperation import LiveHand
@@ -195,7 +195,7 @@ def way_of_stroke(random: np.random.Generator, bounds: FloatArray) -> list[Float
 def served(random: np.random.Generator, life: float, viewer: Viewer) -> Life:
     """Cut tissue in another process, which is killed in the midst of it."""
     server = subprocess.Popen(
-        [sys.executable, "-m", "tests.long.soak_server"],
+        [sys.executable, "-m", "tests.long.soak"],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
@@ -259,3 +259,8 @@ def resident(pid: int) -> int:
     """Return the memory of a process that is in use [bytes]."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+if __name__ == "__main__":  # the tissue of a life, which is served until it is killed
+    tissue = partial(make_tissue, SCENE)
+    serve(tissue, scene="soak", port=0, on_listening=partial(print, flush=True))

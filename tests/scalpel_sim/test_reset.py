@@ -1,20 +1,16 @@
 """A simulation returns to its start, is observed by name, and need not record: for environments."""
 
 import gc
-import threading
 import tracemalloc
 import weakref
-from contextlib import closing
 
 import numpy as np
 import pytest
 
-from bridge import TcpLink
-from bridge.tcp.server import TissueServer
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.errors import UsageError
-from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.recording.observations import farthest_points
+from tests.scalpel_sim.served_scenes import served
 from tests.support.run_files import untimed
 from tissue import StateError
 
@@ -63,9 +59,7 @@ def test_a_simulation_with_a_start_is_freed_with_its_last_reference():
 
 def test_a_tissue_in_another_process_cannot_be_reset_or_saved():
     scene = SCENES["slab"]
-    server = TissueServer(lambda: make_tissue(scene), scene=scene.name, port=0)
-    threading.Thread(target=server.run, daemon=True).start()
-    with closing(TcpLink(server.address)) as link:
+    with served(scene) as link:
         simulation = prepare(scene, link)
         for refused in (
             simulation.reset,

@@ -83,7 +83,7 @@ def test_a_chain_reaches_a_stroke_that_its_joints_can_do(joints, tmp_path):
     np.testing.assert_allclose([found.tip, found.heel], [start.tip, start.heel], atol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["two slides", "gantry", "scara", "five joints", "six hinges"])
+@pytest.mark.parametrize("name", ["two slides", "scara", "six hinges"])
 def test_a_tissue_out_of_reach_is_reached_at_the_pos_that_the_message_says(name, tmp_path):
     arm = chain(tmp_path, CHAINS[name])
     stroke, away = stroke_of(arm), np.array([2.0, -0.7, 1.1])

@@ -46,7 +46,6 @@ THROUGH, SLIT = line(-0.005), line(0.01)
 
 OBEDIENT = {
     "clean through": changed(BLOCK, fixed="left,right", strokes=(THROUGH,)),
-    "a slit": changed(BLOCK, strokes=(SLIT,)),
     "a slit that is cut twice": changed(BLOCK, strokes=(SLIT, SLIT)),
     "a slit that is made deeper": changed(BLOCK, strokes=(line(0.013), line(0.006))),
     "an incision in cells as large as it is deep": changed(
@@ -69,7 +68,6 @@ OBEDIENT = {
         ),
     ),
     "as long as was asked": changed(BLOCK, strokes=(THROUGH,), seconds=0.2),
-    "pushed as long as was asked": changed(FREE, strokes=(line(0.0),), seconds=0.3),
 }
 
 

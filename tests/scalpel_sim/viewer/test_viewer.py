@@ -8,13 +8,14 @@ import urllib.error
 import urllib.request
 
 import pytest
-from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.httpclient import HTTPClientError
 from tornado.websocket import websocket_connect
 
 from scalpel_sim import Viewer
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.viewer import viewer as viewer_module
 from scalpel_sim.viewer.model_shapes import body_poses
+from tests.scalpel_sim.hands.driven_view import page_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 from tests.support.browser import WINDOW, new_tab, pixels_of
@@ -164,20 +165,15 @@ def test_a_page_that_does_not_draw_gets_no_more_pictures(viewer):
     assert 1 <= len(packets) <= 2, "the opening and at most one picture"
 
 
-async def page_of(viewer, origin):
-    """Return the open socket of a page that says it came from there."""
-    headers = {} if origin is None else {"Origin": origin}
-    address = viewer.url.replace("http", "ws") + "frames"
-    return await websocket_connect(HTTPRequest(address, headers=headers))
-
-
 def test_only_pages_of_this_server_make_the_run_compute_what_they_show(viewer):
     own = viewer.url.rstrip("/")
 
     async def pages():
-        no_page, page, other = [await page_of(viewer, origin) for origin in (None, own, own)]
+        no_page, page, other = [
+            await page_of(viewer.url, origin, "") for origin in (None, own, own)
+        ]
         with pytest.raises(HTTPClientError, match="403"):
-            await page_of(viewer, "http://evil.example")
+            await page_of(viewer.url, "http://evil.example", "")
         await no_page.write_message('{"type": "colour", "quantity": "displacement"}')
         await page.write_message('{"type": "colour", "quantity": "heat"}')
         await page.write_message('{"type": "colour", "quantity": "strain"}')
