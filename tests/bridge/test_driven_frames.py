@@ -160,19 +160,3 @@ def test_a_mean_wrench_is_that_of_the_impulses():
     mean = mean_wrench(wrenches, [1.0, 3.0])
     np.testing.assert_array_equal(mean.force, 0.25 * y)
     np.testing.assert_array_equal(mean.torque, 0.25 * z)
-
-
-def test_a_blade_cuts_a_ligament_that_is_far_from_the_body():
-    """The broad phase knows of strands: 30 mm above the top nothing but one is there."""
-    tissue = cube()
-    ligament = tissue.tie(
-        [[0.01, 0.01, 0.02]], [0.01, 0.01, 0.08], stiffness=100.0, area=1e-6, toughness=50.0
-    )
-    bridge = Bridge(tissue)
-    felt = []
-    for y in np.arange(-0.02, 0.06, 1e-3):
-        ends = (np.array([x, y, 0.05]) for x in (-0.02, 0.04))
-        felt.append(bridge.step(BladeSegment(*ends, np.array([0.0, 1.0, 0.0])), DT).force[1])
-    assert ligament.n_points == 0
-    assert min(felt) < -0.02
-    assert bridge.counters.rejected > 20

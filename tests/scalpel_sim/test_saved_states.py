@@ -46,10 +46,10 @@ def test_a_simulation_and_one_made_alike_go_on_from_a_state_with_the_same_bits(s
     simulation = prepare(SCENES[scene])
     simulation.run(seconds)
     state, shown = simulation.save_state(), picture(simulation)
+    of_bytes = SimulationState.from_bytes(state.to_bytes())
     other = with_rows_of(simulation, SCENES[scene])
     expected, counted = go_on(simulation)
     assert picture(simulation) != shown
-    of_bytes = SimulationState.from_bytes(state.to_bytes())
     for each, saved in ((simulation, state), (simulation, state), (other, of_bytes)):
         each.load_state(saved)
         assert picture(each) == shown

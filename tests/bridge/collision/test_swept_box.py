@@ -9,7 +9,6 @@ from bridge.collision.collision_objects import MovableBox, are_colliding
 from bridge.collision.swept_box import (
     TOUCHING_MARGIN,
     SweptBox,
-    box_around,
     edge_axes,
     gap_between,
     swept_blade,
@@ -108,12 +107,6 @@ def test_the_axes_of_an_edge_form_a_rotation(pose):
     axes = edge_axes(pose)
     np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-9)
     assert np.linalg.det(axes) == pytest.approx(1.0)
-
-
-def test_a_box_around_a_point_has_a_positive_size():
-    box = box_around(np.array([[1.0, 2.0, 3.0]]), np.eye(3))
-    np.testing.assert_array_equal(box.centre, [1.0, 2.0, 3.0])
-    np.testing.assert_allclose(box.size, 2.0 * TOUCHING_MARGIN)
 
 
 # ---- gaps ----------------------------------------------------------------------------------------

@@ -144,22 +144,13 @@ def after_a_period(felt, exerted, pose=UPRIGHT):
     return compensation
 
 
-def test_nothing_is_returned_where_arm_and_tissue_felt_the_same():
-    compensation = after_a_period(PUSH, PUSH)
+@pytest.mark.parametrize("share", [1.0, 0.8, 1.3], ids=["the same", "too little", "too much"])
+def test_what_the_arm_felt_too_little_or_too_much_is_returned_over_one_period(share):
+    compensation = after_a_period(share * PUSH, PUSH)
+    assert compensation.missing == pytest.approx((1.0 - share) * PERIOD * PUSH, abs=1e-15)
+    assert feel_for_a_period(compensation, PUSH) == pytest.approx([share - 2.0] * 10)
     assert compensation.missing == pytest.approx(np.zeros(6), abs=1e-15)
     assert feel_for_a_period(compensation, PUSH) == pytest.approx([-1.0] * 10)
-
-
-def test_a_missing_impulse_is_returned_over_one_period():
-    compensation = after_a_period(0.8 * PUSH, PUSH)
-    assert compensation.missing == pytest.approx(0.2 * PERIOD * PUSH)
-    assert feel_for_a_period(compensation, PUSH) == pytest.approx([-1.2] * 10)
-    assert compensation.missing == pytest.approx(np.zeros(6), abs=1e-15)
-    assert feel_for_a_period(compensation, PUSH) == pytest.approx([-1.0] * 10)
-
-
-def test_an_excess_of_impulse_is_subtracted():
-    assert feel_for_a_period(after_a_period(1.3 * PUSH, PUSH), PUSH) == pytest.approx([-0.7] * 10)
 
 
 def test_a_missing_angular_impulse_is_about_a_fixed_point():

@@ -5,7 +5,6 @@ import socket
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -191,17 +190,6 @@ def test_the_client_waits_for_a_run_that_gets_ready_meanwhile():
     port = free_port()
     with started_first(EXAMPLE, port) as client, served_blade(port=port):
         assert "organ" in client.stdout.readline()
-
-
-def test_a_device_with_patience_waits_for_a_run_and_says_so_once(caplog):
-    port = free_port()
-    with ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(DeviceClient, f"127.0.0.1:{port}", patience=60.0)
-        while "yet; waiting for it" not in caplog.text:
-            time.sleep(0.01)
-        with served_blade(port=port), asked.result(60.0) as client:
-            assert client.measured().time == STATE.time
-    assert caplog.text.count("no run waits for a device") == 1
 
 
 def test_a_device_whose_patience_ends_says_that_there_is_no_run(monkeypatch):

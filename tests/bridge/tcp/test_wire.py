@@ -1,5 +1,3 @@
-import struct
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,7 +5,6 @@ from hypothesis import strategies as st
 from bridge.tcp.wire import (
     HEADER_BYTES,
     LARGEST_FRAME,
-    PROTOCOL_VERSION,
     FrameReader,
     MessageError,
     MessageKind,
@@ -62,12 +59,3 @@ def test_a_payload_over_the_limit_is_refused_before_it_arrives():
     stream = pack_frame(MessageKind.STEP, 0, bytes(LARGEST_FRAME + 1))
     with pytest.raises(MessageError, match="1048577 bytes; at most 1048576"):
         reader_of(stream[:HEADER_BYTES]).take()
-
-
-def test_another_version_is_refused_by_its_number():
-    stream = bytearray(pack_frame(MessageKind.HELLO, 0))
-    struct.pack_into("<H", stream, 4, PROTOCOL_VERSION + 1)
-    with pytest.raises(
-        MessageError, match=f"version {PROTOCOL_VERSION + 1} .* this one {PROTOCOL_VERSION}"
-    ):
-        reader_of(bytes(stream)).take()

@@ -3,7 +3,7 @@ import pytest
 
 from bridge import FixtureBox
 from scalpel_sim import SCENES, StrokeTable, prepare
-from scalpel_sim.arm.arm import ARMS, Arm
+from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import FLOOR_MARGIN, CollisionMonitor, floor_below
 from scalpel_sim.scene.scene import changed
 
@@ -20,13 +20,6 @@ def lowered(arm, height):
         arm.step2()
 
 
-@pytest.mark.parametrize("preset", ARMS)
-def test_an_arm_at_home_touches_nothing(preset, caplog):
-    monitor = CollisionMonitor(Arm(preset))
-    monitor.check()
-    assert monitor.now == () and monitor.frames == {} and not caplog.records
-
-
 def test_a_blade_that_is_led_into_the_table_is_counted_and_gets_one_warning(caplog):
     arm = Arm("touch")
     monitor = CollisionMonitor(arm)
@@ -38,16 +31,6 @@ def test_a_blade_that_is_led_into_the_table_is_counted_and_gets_one_warning(capl
         record.message for record in caplog.records if "blade meets the table" in record.message
     ]
     assert len(warnings) == 1 and "they push each other" in warnings[0]
-
-
-def test_a_handle_that_touches_a_clamp_is_named_with_it():
-    arm = Arm("touch")
-    arm.step1()
-    handle = arm.data.geom("stylus").xpos
-    clamp = FixtureBox("clamp", np.full(3, 0.01), handle + np.array([0.0, 0.0, 0.012]))
-    monitor = CollisionMonitor(arm, [clamp])
-    monitor.check()
-    assert ("stylus", "clamp") in monitor.now
 
 
 def test_an_instrument_that_is_folded_back_on_the_arm_is_found():

@@ -44,11 +44,6 @@ def test_the_margin_is_the_smallest_distance_from_a_range_end():
     assert reach(geometry(arm.model), *pose_in_base(arm), 0.0).margin == pytest.approx(0.1)
 
 
-def test_a_pose_that_is_too_far_away_has_a_negative_margin():
-    arm = geometry(Arm("premium").model)
-    assert reach(arm, np.array([0.0, 1.0, 0.2]), np.diag([-1.0, 1.0, -1.0]), 0.0).margin < 0.0
-
-
 def test_the_same_poses_give_the_same_bits_wherever_their_arrays_lie_in_memory():
     """NumPy 2.0 gave others in one of ten calls; the arm of a run that was repeated stood there."""
     arm, random = geometry(Arm("touch").model), np.random.default_rng(0)

@@ -134,14 +134,6 @@ def test_a_key_that_is_not_given_keeps_the_value_of_the_scene(tmp_path):
     assert scene.blade == BladeShape(height=0.01)
 
 
-def test_an_option_overrides_the_file(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('[material]\nlaw = "springs"\npoisson_ratio = 0.1\ntoughness = 7\n')
-    scene = chosen_scene("slab", options(path, law="neo_hookean", toughness=9.0))
-    assert (scene.material.law.name, scene.material.poisson_ratio) == ("neo_hookean", 0.1)
-    assert scene.material.toughness == 9.0
-
-
 def test_a_thickness_of_zero_in_the_file_is_a_line_unless_an_option_makes_it_a_blade(tmp_path):
     path = tmp_path / "line.toml"
     path.write_text("[blade]\nthickness = 0\nbevel_degrees = 20\nheight = 0.01\n")

@@ -163,18 +163,6 @@ def test_it_lets_go_where_its_jaws_open():
     assert tissue.pieces()[0].velocity[2] == pytest.approx(-9.81 * 0.14, rel=0.2)  # it falls
 
 
-def test_it_takes_what_is_there_each_time_it_closes():
-    tissue = hanging()
-    hand = led(
-        rows((0.0, 0.005, 0.007), (0.05, 0.005, 0.007), (0.1, 0.005, 0.01), (0.15, 0.005, 0.007)),
-        tissue,
-    )
-    run(hand, tissue, 0.05)
-    first = hand.grip
-    run(hand, tissue, 0.12)
-    assert hand.n_points > 0 and hand.grip is not first
-
-
 @pytest.mark.parametrize(
     "settings", [GripSettings(closed=0.008), None], ids=["tied", "by friction"]
 )

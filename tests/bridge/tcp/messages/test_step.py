@@ -80,12 +80,6 @@ def test_a_pose_with_one_impossible_number_is_refused(path, place, bad):
         unpack_step(packed, 3, 3)
 
 
-def test_a_reflection_is_no_rotation():
-    mirrored = np.diag([1.0, 1.0, -1.0])
-    with pytest.raises(MessageError, match="axes of frame 0 are no rotation"):
-        unpack_step(pack_step(None, 1e-3, [FramePose(np.zeros(3), mirrored)]), 1)
-
-
 @pytest.mark.parametrize("place", [0, 5, 6, 8, 9, 17])
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -1e4])
 def test_a_blade_with_one_impossible_number_is_refused(place, bad):
