@@ -20,7 +20,7 @@ WRONG_FILES = {
     "no file": (None, r"cannot be read: No such file.*materials --write"),
     "nothing": ("", r"has no table \[material\]; .*materials --write"),
     "a series that leaves nothing": (
-        '[material]\nlaw = "neo_hookean"\nprony = [[0.6, 0.1], [0.5, 1]]',
+        '[material]\nlaw = "neo_hookean"\nprony = [[0.6, 0.1], [0.5, 1]]\n[blade]',
         r"mine.toml: \[material\]: prony has g whose sum is 1.1",
     ),
     "no blade": ("[material]\ndensity = 1000", r"has no table \[blade\]"),
