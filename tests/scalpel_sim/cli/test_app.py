@@ -45,6 +45,11 @@ WRONG_USE = {
         ["run", "slab", "--coupling-stiffness", "500"],
         "--coupling-stiffness is for --coupling virtual",
     ),
+    "a coupling without damping": (
+        ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
+        "damping is 0.0; it must be positive",
+    ),
+    "a speed of 0": (["run", "slab", "--speed", "0"], "speed"),
     "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
     "a list of an unknown material": (["materials", "lung"], "Known: liver"),
     "springs of a law that has none": (
