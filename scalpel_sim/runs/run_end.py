@@ -24,7 +24,7 @@ from scalpel_sim.runs.file_names import (
 )
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
+from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.pictures import add_to
 from scalpel_sim.viewer.replay import ReplayWriter

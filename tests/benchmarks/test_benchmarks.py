@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
-from benchmarks.frame import Stopwatches, trace_frame
-from benchmarks.kernels import kernels
-from benchmarks.roofline import roofline
+from benchmarks.frame import Stopwatches, Trace, trace_frame
 from benchmarks.scaling import (
     RELAXATION_NAME,
     SMALLEST_CUT,

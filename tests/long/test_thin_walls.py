@@ -9,10 +9,10 @@ stroke through it, at a random place, angle and speed.
 import itertools
 
 import numpy as np
-from scalpel_sim.strokes.table import StrokeTable
 
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import GEL
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from tests.support.battery import battery
 from tests.support.bodies import half_shell

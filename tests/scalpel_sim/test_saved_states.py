@@ -8,8 +8,8 @@ import pytest
 
 from scalpel_sim import SCENES, SimulationState, prepare
 from scalpel_sim.scene.scene import changed
-from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
-from scalpel_sim.viewer.pictures import readings, values_in
+from scalpel_sim.viewer.model_shapes import shapes_of
+from scalpel_sim.viewer.pictures import state_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.support.run_files import untimed
 from tissue import StateError, SurfaceQuantity, TissueState
@@ -28,9 +28,7 @@ def go_on(simulation):
 def picture(simulation):
     """Return what a page is told to show of a simulation."""
     packets = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
-    values = values_in(simulation, get_args(SurfaceQuantity))
-    surface, poses = simulation.link.surface(), body_poses(simulation.arm.data)
-    return packets.frame(surface, poses, readings(simulation), None, values)
+    return packets.frame(state_of(simulation, get_args(SurfaceQuantity)))
 
 
 def with_rows_of(other, scene):

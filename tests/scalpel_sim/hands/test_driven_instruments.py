@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
 
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.arm.grasper import HALF_PAD
@@ -18,6 +17,7 @@ from scalpel_sim.runs.file_names import FINAL, SCENE, STROKE, grasp_file
 from scalpel_sim.runs.run import REST_AFTER_STROKE
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS, grasp_from_csv
 from tests.scalpel_sim.hands.driven_runs import PERIOD, Clock, controls_of, done, led, move, turn
 from tests.support.run_files import assert_same_run, untimed
 

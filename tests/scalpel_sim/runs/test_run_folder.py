@@ -1,6 +1,7 @@
 import functools
 import json
 import re
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
