@@ -107,39 +107,3 @@ def forces(
         out[a] += pull * direction
         out[b] -= pull * direction
     return out
-
-
-def passes_through(
-    p_t0: FloatArray, p_t1: FloatArray, t0: FloatArray, t1: FloatArray, n_instants: int = 300
-) -> bool | None:
-    """Return whether a point passes through a triangle inwards and stays below, by sampling time.
-
-    None where it passes so close to the boundary of the triangle that samples cannot decide.
-    """
-    before, uncertain, through = None, False, False
-    for when in np.linspace(0.0, 1.0, n_instants):
-        p, (a, b, c) = p_t0 + when * (p_t1 - p_t0), t0 + when * (t1 - t0)
-        normal = np.cross(b - a, c - a)
-        height = float((p - a) @ normal) / float(np.linalg.norm(normal))
-        if before is not None and before > 0.0 >= height:
-            solution = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), p - a, rcond=None)[0]
-            smallest = min(*solution, 1.0 - solution.sum())
-            uncertain |= abs(smallest) < 0.05
-            through |= smallest > 0.0
-        if before is not None and before < 0.0 <= height:
-            through = False
-        before = height
-    weights = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), p - a, rcond=None)[0]
-    uncertain |= abs(min(*weights, 1.0 - weights.sum())) < 0.05 or abs(height) < 1e-3
-    return None if uncertain else through
-
-
-def distance_to_triangle(p: FloatArray, triangle: FloatArray) -> float:
-    """Return the distance of a point from the nearest point of a triangle [m]."""
-    a, b, c = triangle
-    inside = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), p - a, rcond=None)[0]
-    nearest = [a + max(0.0, min(1.0, (p - a) @ (b - a) / ((b - a) @ (b - a)))) * (b - a)
-               for a, b in ((a, b), (b, c), (c, a))]  # fmt: skip
-    if inside.min() >= 0.0 and inside.sum() <= 1.0:
-        nearest.append(a + inside @ np.stack([b - a, c - a]))
-    return float(min(np.linalg.norm(p - q) for q in nearest))

@@ -20,21 +20,6 @@ def nystroem(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
     return x + h * v + h**2 / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
 
 
-def classical(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
-    """Take one step of the classical method on the system x' = v, v' = a(x, v) of first order."""
-
-    def rates(state: FloatArray) -> FloatArray:
-        return np.array([state[1], a(state[0], state[1])])
-
-    y = np.array([x, v])
-    k1 = rates(y)
-    k2 = rates(y + h / 2 * k1)
-    k3 = rates(y + h / 2 * k2)
-    k4 = rates(y + h * k3)
-    x, v = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return x, v
-
-
 def three_stages(a: Acceleration, x: FloatArray, v: FloatArray, h: float, c: float) -> tuple:
     """Take one step of the Nystroem method of 4th order with three stages, the second at `c`.
 

@@ -91,21 +91,6 @@ class SolidBody(NamedTuple):
         """Return the bound on the angular frequencies [1/s]."""
         return float(np.sqrt(self.solid.frequency_squared[: self.body.n_nodes].max()))
 
-    def relaxed(
-        self, positions: FloatArray, seconds: float, drag: float, pull: FloatArray | None = None
-    ) -> FloatArray:
-        """Return the positions after `seconds` under drag [1/s] and dead loads `pull` [N].
-
-        The step is a sixth of the stable one at rest: crushed tetrahedra are stiffer.
-        """
-        n = self.body.n_nodes
-        x = self.placed(positions).copy()
-        h = 2.0 / self.frequency() / 6.0
-        load = np.zeros((n, 3)) if pull is None else pull
-        scratch = np.zeros((2, n, 3))
-        integrate(self.solid, self.body, x, load, scratch, h, drag, int(seconds / h))
-        return x[:n]
-
 
 def solid_of(
     mesh: TetrahedralMesh,
@@ -152,12 +137,6 @@ def moved(mesh: TetrahedralMesh, share: float = 0.1, seed: int = 0) -> FloatArra
     return mesh.positions + share * np.ptp(mesh.positions) * noise
 
 
-def j_of(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
-    """Return J of each tetrahedron: its volume over that at rest."""
-    corners, rest = positions[mesh.tetrahedra], mesh.positions[mesh.tetrahedra]
-    return np.linalg.det(corners[:, 1:] - corners[:, :1]) / np.linalg.det(rest[:, 1:] - rest[:, :1])
-
-
 def highest_frequency(solid: SolidBody, positions: FloatArray | None = None) -> float:
     """Return the highest angular frequency at rest or at `positions` [1/s]."""
     here = solid.body.rest[: solid.body.n_nodes].copy() if positions is None else positions
@@ -200,27 +179,3 @@ def relax_where_it_is(solid: Solid, body: Body, seconds: float) -> None:
         pressures(solid, solid.every, 0, n)
     prepare_relaxation(solid, seconds)
     relax_blocks(solid, 0, blocks)
-
-
-@kernel
-def integrate(
-    solid: Solid,
-    body: Body,
-    x: FloatArray,
-    load: FloatArray,
-    scratch: FloatArray,
-    h: float,
-    drag: float,
-    n_steps: int,
-) -> None:
-    """Take symplectic Euler steps, which are accurate enough for a test of forces."""
-    v, f = scratch[0], scratch[1]
-    n = body.n_nodes
-    for _ in range(n_steps):
-        evaluate(solid, body, x, f)
-        for i in range(n):
-            if not body.fixed[i]:
-                for c in range(3):
-                    rate = (f[i, c] + load[i, c]) / body.masses[i]
-                    v[i, c] = (v[i, c] + h * rate) / (1.0 + h * drag)
-                    x[i, c] += h * v[i, c]

@@ -57,15 +57,6 @@ def test_a_cut_along_the_faces_of_the_mesh_has_no_path_error_and_no_growth():
     assert (found.growth, found.frequency_growth) == (1.0, pytest.approx(1.0, rel=0.5))
 
 
-def test_the_report_after_a_later_cut_includes_the_path_error_of_the_first():
-    tissue = cut_at(0.0185)
-    first = tissue.cut_report()
-    make(tissue, upright(0.0324, -0.005, SIZE + 0.01, -0.01, SIZE + 0.01))
-    both = tissue.cut_report()
-    assert both.n_cut_nodes > first.n_cut_nodes
-    assert both.path_error_largest >= first.path_error_largest
-
-
 def test_less_snapping_follows_the_blade_more_closely_and_needs_shorter_time_steps():
     rough, fine = curved_with(0.5, 0.25), curved_with(0.05, 0.05)
     assert fine.path_error_mean < 0.5 * rough.path_error_mean

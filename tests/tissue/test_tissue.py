@@ -32,21 +32,23 @@ def tissue():
     return Tissue(MESH, fixed=bodies.sides(MESH), gravity=(0.0, 0.0, 0.0))
 
 
-def sweep_to(**changes):
-    return BladeSweep(POSE, POSE._replace(**changes))
+REFUSED = [  # the blade at the end of a step, and what is said of it
+    *(({part: [0.0, x, 0.0]}, "finite") for part in BladeSegment._fields for x in (np.nan, np.inf)),
+    *(({"tip": wrong}, "blade") for wrong in (np.zeros(2), np.zeros((3, 1)), np.zeros(4))),
+    ({"heel": POSE.tip}, "no length"),
+    ({"forward": [0.0, 0.0, 1.0]}, "edge"),
+    ({"forward": [0.0, 0.0, 0.0]}, "edge"),
+    ({"forward": -POSE.forward}, "smaller steps"),
+    ({"forward": [1.0, 0.0, 0.0]}, "smaller steps"),
+    ({"tip": POSE.heel, "heel": POSE.tip}, "smaller steps"),
+]
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("part", BladeSegment._fields)
-def test_a_blade_that_is_not_finite_is_refused(tissue, part, value):
-    with pytest.raises(ValueError, match="finite"):
-        tissue.step(sweep_to(**{part: np.array([0.0, value, 0.0])}), 1e-3)
-
-
-@pytest.mark.parametrize("wrong", [np.zeros(2), np.zeros((3, 1)), np.zeros(4)])
-def test_a_blade_of_another_shape_is_refused(tissue, wrong):
-    with pytest.raises(ValueError, match="blade"):
-        tissue.step(sweep_to(tip=wrong), 1e-3)
+@pytest.mark.parametrize(("changes", "said"), REFUSED)
+def test_a_motion_of_the_blade_that_makes_no_sense_is_refused(tissue, changes, said):
+    arrays = {name: np.array(value) for name, value in changes.items()}
+    with pytest.raises(ValueError, match=said):
+        tissue.step(BladeSweep(POSE, POSE._replace(**arrays)), 1e-3)
 
 
 @pytest.mark.parametrize(("length", "why"), [(1e-4, "shorter than"), (200.0, "too long")])
@@ -68,42 +70,10 @@ def test_a_long_edge_has_as_many_samples_as_a_short_one_for_its_length(tissue):
     assert samples(3.0) == pytest.approx(10 * samples(0.3), rel=0.02)
 
 
-def test_a_blade_without_length_is_refused(tissue):
-    with pytest.raises(ValueError, match="no length"):
-        tissue.step(sweep_to(heel=POSE.tip), 1e-3)
-
-
-@pytest.mark.parametrize("forward", [(0.0, 0.0, 1.0), (0.0, 0.0, 0.0)])
-def test_a_blade_that_faces_along_its_own_edge_is_refused(tissue, forward):
-    with pytest.raises(ValueError, match="edge"):
-        tissue.step(sweep_to(forward=np.array(forward)), 1e-3)
-
-
-@pytest.mark.parametrize(
-    "rotated",
-    [
-        {"forward": -POSE.forward},
-        {"forward": np.array([1.0, 0.0, 0.0])},
-        {"tip": POSE.heel, "heel": POSE.tip},
-    ],
-)
-def test_a_blade_that_turns_by_a_right_angle_in_one_step_is_refused(tissue, rotated):
-    with pytest.raises(ValueError, match="smaller steps"):
-        tissue.step(sweep_to(**rotated), 1e-3)
-
-
 @pytest.mark.parametrize("dt", [-1e-3, np.nan, np.inf])
 def test_a_time_step_that_is_negative_or_not_finite_is_refused(tissue, dt):
     with pytest.raises(ValueError, match="dt"):
         tissue.step(None, dt)
-
-
-def test_a_refused_step_changes_nothing(tissue):
-    before = tissue.snapshot()
-    with pytest.raises(ValueError, match="no length"):
-        tissue.step(sweep_to(heel=POSE.tip), 1e-3)
-    for a, b in zip(before, tissue.snapshot(), strict=True):
-        np.testing.assert_array_equal(a, b)
 
 
 BROKEN = {
@@ -115,19 +85,14 @@ BROKEN = {
     "no tetrahedra": MESH._replace(tetrahedra=np.zeros((0, 4), dtype=np.int64)),
     "NaN": MESH._replace(positions=np.where(MESH.positions == 0.02, np.nan, MESH.positions)),
     "flat": MESH._replace(positions=MESH.positions * [1.0, 1.0, 0.0]),
+    "checked": MESH._replace(positions=np.vstack([MESH.positions, [1.0, 1.0, 1.0]])),
 }
 
 
 @pytest.mark.parametrize("fault", BROKEN)
 def test_a_broken_mesh_is_refused(fault):
-    with pytest.raises(MeshError):
+    with pytest.raises(MeshError, match=fault if fault == "checked" else None):
         Tissue(BROKEN[fault])
-
-
-def test_a_mesh_that_needs_repair_is_refused():
-    unused = MESH._replace(positions=np.vstack([MESH.positions, [1.0, 1.0, 1.0]]))
-    with pytest.raises(MeshError, match="checked"):
-        Tissue(unused)
 
 
 @pytest.mark.parametrize(
@@ -184,28 +149,6 @@ def test_bounds_are_the_current_lowest_and_highest_corner(tissue):
     np.testing.assert_array_equal(tissue.step(None, 1e-3).bounds, tissue.bounds)
 
 
-def test_a_fixed_node_stays_at_its_given_position():
-    stretched = MESH.positions * [1.2, 1.0, 1.0]
-    tissue = Tissue(MESH, fixed=bodies.sides(MESH), positions=stretched)
-    for _ in range(50):
-        tissue.step(None, 1e-3)
-    fixed = bodies.sides(MESH)
-    np.testing.assert_array_equal(tissue.snapshot().positions[fixed], stretched[fixed])
-
-
-def test_a_body_held_at_its_bottom_settles_under_its_weight():
-    """The springs of the held nodes carry the whole weight above them."""
-    low = MESH.positions[:, 2] == 0.0
-    tissue = Tissue(MESH, fixed=low)
-    assert tissue.settle() < 20_000
-    body = tissue.snapshot()
-    assert (body.velocities == 0.0).all()
-    assert -5e-3 < (body.positions - MESH.positions)[:, 2].min() < -1e-5
-    for _ in range(100):
-        tissue.step(None, 1e-3)
-    np.testing.assert_allclose(tissue.snapshot().positions, body.positions, atol=2e-6)
-
-
 def test_a_step_of_zero_length_moves_nothing(tissue):
     before = tissue.snapshot().positions
     result = tissue.step(BladeSweep(POSE, POSE), 0.0)
@@ -246,14 +189,6 @@ def test_a_blade_of_another_length_starts_with_new_anchors(tissue):
 def sweep_of(y, length):
     pose = strokes.pose((0.0187, y, -0.01), (0.0187, y, -0.01 + length), (0.0, 1.0, 0.0))
     return BladeSweep(pose, pose)
-
-
-def test_without_a_blade_the_body_sags_under_gravity(tissue):
-    sagging = Tissue(MESH, fixed=bodies.sides(MESH))
-    result = sagging.step(None, 1e-3)
-    assert result.anchored_length == 0.0
-    assert not np.any(result.wrench.force)
-    assert sagging.snapshot().velocities[:, 2].min() < 0.0
 
 
 def test_a_tissue_that_is_no_longer_used_is_freed_at_once():

@@ -19,7 +19,6 @@ ALLOWED = 0.02 * ELEMENT
 """Largest allowed penetration of one body into another [m]; springs must be pressed to push."""
 
 AT_REST = 0.01
-AUDITED = SolverSettings(audit=True)
 
 
 def pressed_blocks(solver: SolverSettings = SolverSettings(), beside=(0.0, 0.0)) -> Tissue:
@@ -62,18 +61,6 @@ def test_what_is_no_longer_found_lets_go_little_by_little():
     assert np.all(np.diff(forces) <= 0.0)
     assert forces[-1] == 0.0
     assert tissue._model.contact.forces.n_contacts == 0
-
-
-def test_what_is_found_again_goes_on_with_the_force_that_fades():
-    tissue = pressed_blocks()
-    for _ in range(500):
-        before = tissue.step(None, strokes.DT).body_contacts.force
-    lift(tissue, ELEMENT)
-    tissue.step(None, strokes.DT)
-    lift(tissue, -ELEMENT)
-    for _ in range(2):
-        assert tissue.step(None, strokes.DT).body_contacts.force > 0.4 * before
-    assert tissue._model.contact.forces.n_fading == 0
 
 
 def advance(tissue: Tissue, duration: float, every: int = 50) -> float:
@@ -119,18 +106,6 @@ def test_friction_of_0_3_holds_a_block_on_a_slope_of_less_than_16_7_degrees(degr
     assert moved > 0.01 if slides else abs(moved) < 1e-4
 
 
-def test_where_nothing_touches_contact_changes_no_bit():
-    def run(floor: float | None) -> Tissue:
-        mesh = block((3, 3, 3), (0.03,) * 3)
-        tissue = Tissue(mesh, fixed=bodies.sides(mesh), floor=floor)
-        for _ in range(50):
-            tissue.step(None, strokes.DT)
-        return tissue
-
-    for one, other in zip(run(-0.05).snapshot(), run(None).snapshot(), strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
 def split_block(solver: SolverSettings = SolverSettings()) -> Tissue:
     """Return a block cut in two, whose held sides are pushed together by 1 mm."""
     mesh = bodies.jittered(3, 0)
@@ -162,36 +137,6 @@ def test_freshly_cut_lips_under_no_load_have_no_contact_force():
     assert speed(tissue) < 1e-9
 
 
-def test_a_cut_body_at_rest_neither_creeps_nor_loses_energy():
-    mesh = block((4, 4, 4), (0.04,) * 3)
-    solver = AUDITED
-    fixed = mesh.positions[:, 2] == 0.0
-    tissue = Tissue(mesh, Material(viscous_damping=20.0), fixed=fixed, solver=solver)
-    edges = [[(-0.01, y, 0.0213), (0.05, y, 0.0213)] for y in (-0.01, 0.03)]
-    assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
-    for _ in range(1000):
-        tissue.step(None, strokes.DT)
-    positions, before = tissue.snapshot().positions, tissue.step(None, strokes.DT)
-    for _ in range(1000):
-        after = tissue.step(None, strokes.DT)
-    assert after.body_contacts.n_contacts > 5
-    assert np.abs(tissue.snapshot().positions - positions).max() < 1e-6
-    fallen = before.energies.elastic
-    assert abs(after.energies.residual - before.energies.residual) < 1e-6 * fallen
-
-
-def test_lips_that_are_pressed_shut_do_not_overlap_and_come_to_rest():
-    tissue = split_block()
-    for _ in range(100):
-        squeeze(tissue, 1e-5)
-        tissue.step(None, strokes.DT)
-    for _ in range(1000):
-        pressed = tissue.step(None, strokes.DT).body_contacts
-    assert pressed.force > 0.1
-    assert overlap_depth(tissue.snapshot()) < ALLOWED
-    assert speed(tissue) < AT_REST
-
-
 def test_lips_that_lie_node_on_node_press_as_much_as_those_that_are_shifted():
     """Each node meets all faces around its twin; they count once."""
     pushed = []
@@ -213,52 +158,6 @@ def test_lips_that_lie_node_on_node_press_as_much_as_those_that_are_shifted():
     assert pushed[1].force == pytest.approx(pushed[0].force, rel=0.05)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_run_is_reproducible_to_the_bit(threads):
-    def run(n: int) -> Tissue:
-        tissue = pressed_blocks(SolverSettings(threads=n))
-        for _ in range(60):
-            result = tissue.step(None, strokes.DT)
-        assert result.body_contacts.n_contacts > 0
-        return tissue
-
-    for one, other in zip(run(1).snapshot(), run(threads).snapshot(), strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
-def test_the_account_of_energy_closes_within_1_percent_where_contact_presses():
-    tissue = pressed_blocks(AUDITED)
-    for _ in range(400):
-        energies = tissue.step(None, strokes.DT).energies
-    spent = -energies.potential
-    assert spent > 0.0 and energies.contact > 0.0
-    assert abs(energies.residual) < 0.01 * spent
-
-
-def test_the_account_of_energy_closes_within_1_percent_over_a_cut():
-    mesh = block((4, 4, 4), (0.04,) * 3)
-    solver = AUDITED
-    tissue = Tissue(mesh, Material(toughness=5.0), fixed=bodies.sides(mesh), solver=solver)
-    stroke = strokes.slanted(mesh)
-    for sweep in [*strokes.sweeps(stroke), *[None] * 100]:
-        result = tissue.step(sweep, strokes.DT)
-    assert result.energies.contact != 0.0
-    assert abs(result.energies.residual) < 0.01 * result.energies.work_of_blade
-
-
-def test_a_piece_that_is_cut_off_lands_on_the_floor():
-    mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
-    fixed = mesh.positions[:, 0] <= 0.02
-    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.03)
-    strokes.make(tissue, strokes.straight(mesh, 0.75))
-    for _ in range(1000):
-        result = tissue.step(None, strokes.DT)
-    loose = next(piece for piece in tissue.pieces() if not piece.is_held)
-    assert -0.03 < loose.centre[2] < -0.015
-    assert result.body_contacts.force_of_floor[2] == pytest.approx(loose.mass * 9.81, rel=0.1)
-    assert np.linalg.norm(loose.velocity) < AT_REST
-
-
 def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
     def run() -> Tissue:
         tissue = split_block()
@@ -271,21 +170,6 @@ def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
     monkeypatch.setattr("tissue.contact.self_contact.CAPACITY_OF_PAIRS", 4)
     for one, other in zip(ample.snapshot(), run().snapshot(), strict=True):
         np.testing.assert_array_equal(one, other)
-
-
-def test_lips_that_lie_inside_each_other_come_out():
-    """At rest they touch; both were moved 1 mm into each other before any contact was known."""
-    tissue = split_block()
-    body, n = tissue._body, tissue.n_nodes
-    tetrahedra = body.tetrahedra[: tissue.n_tetrahedra]
-    is_left = np.zeros(n, dtype=bool)
-    is_left[tetrahedra[body.rest[tetrahedra].mean(axis=1)[:, 0] < 0.0207]] = True
-    body.positions[:n, 0] += np.where(is_left, 1e-3, -1e-3)
-    before = overlap_depth(tissue.snapshot())
-    assert before > 0.15 * ELEMENT
-    for _ in range(500):
-        tissue.step(None, strokes.DT)
-    assert overlap_depth(tissue.snapshot()) < 0.2 * before
 
 
 def test_what_is_found_inside_another_part_comes_out():
@@ -328,7 +212,7 @@ def test_a_cut_body_neither_gains_energy_nor_creeps_as_it_rests_in_motion(gravit
         return (stored, energies.residual, energies.contact), tissue.snapshot().positions
 
     energies, positions = after(2.0)  # until it has swung out
-    energies_at_last, positions_at_last = after(20.0)
+    energies_at_last, positions_at_last = after(6.0)
     np.testing.assert_allclose(energies_at_last, energies, rtol=0.0, atol=1e-9)
     assert np.abs(positions_at_last - positions).max() < 1e-6
 
@@ -394,37 +278,6 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     last = tissue.step(None, strokes.DT)
     assert last.body_contacts.force == pytest.approx(1.0, rel=0.2)
     assert speed(tissue) < AT_REST
-
-
-def test_crossed_beams_touch_edge_on_edge():
-    """Both beams stand on an edge, so that no node comes near a face of the other."""
-    beam = block((6, 1, 1), (0.06, 0.01, 0.01))
-    c = np.sqrt(0.5)
-    on_edge = (beam.positions - [0.03, 0.005, 0.005]) @ np.array(
-        [[1.0, 0.0, 0.0], [0.0, c, c], [0.0, -c, c]]
-    )
-    lower = beam._replace(positions=on_edge)
-    upper = beam._replace(positions=on_edge[:, [1, 0, 2]] * [1.0, -1.0, 1.0])
-    mesh = joined(lower, upper, (0.005, 0.005, 0.0145))
-    n = len(on_edge)
-    fixed = np.arange(len(mesh.positions)) < n
-    tissue = Tissue(
-        mesh,
-        Material(viscous_damping=20.0),
-        fixed=fixed,
-        gravity=(0.0, 0.0, -2.0),
-    )
-    low, ridge = mesh.positions[n:, 2].min(), mesh.positions[:n, 2].max()
-    edge = (mesh.positions[n:, 2] < low + 1e-9) & (np.abs(mesh.positions[n:, 1]) < 0.006)
-    assert edge.sum() == 2 and low > ridge
-    most_contacts = 0
-    for _ in range(300):
-        contacts = tissue.step(None, strokes.DT).body_contacts
-        most_contacts = max(most_contacts, contacts.n_contacts)
-        # The edge between the two nodes crosses the ridge of the lower beam, which is at y = 0.
-        (_, y0, z0), (_, y1, z1) = tissue.snapshot().positions[n:][edge]
-        assert z0 - y0 * (z1 - z0) / (y1 - y0) > ridge - ALLOWED
-    assert most_contacts > 0
 
 
 @pytest.mark.parametrize("floor", [np.nan, np.inf, 0.011])

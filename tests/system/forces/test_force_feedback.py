@@ -168,13 +168,6 @@ def test_a_cut_through_a_virtual_coupling_is_the_same_cut(cut):
     assert forces[1] == pytest.approx(forces[0], rel=0.02)
 
 
-def test_a_pressing_arm_rests_where_hand_and_tissue_are_in_balance(press):
-    hand, wrench = press.simulation.arm.hand, press.simulation.wrench
-    size = float(np.linalg.norm(wrench.force))
-    assert size > 0.1
-    assert np.linalg.norm(hand.force + wrench.force) < 0.01 * size
-
-
 def test_the_hand_deflects_by_force_over_its_stiffness(press):
     arm, wrench = press.simulation.arm, press.simulation.wrench
     stiffness = arm.model.actuator("hand_x").gainprm[0]
@@ -218,17 +211,6 @@ def test_the_force_on_the_arm_never_exceeds_the_limit_of_its_device():
     assert reported.max() > 3.5
     assert applied_force.max() <= 3.3 * (1.0 + 1e-12)
     assert found.simulation.bridge.counters.force_limited == (reported > 3.3).sum()
-
-
-def test_the_force_of_the_tissue_moves_the_arm(monkeypatch):
-    """Without the force of the tissue the blade would be further on."""
-    free, coupled = (prepare(SCENES["grid2"]) for _ in range(2))
-    monkeypatch.setattr(free.arm.blade, "apply", lambda wrench: None)
-    seconds = 0.5 * coupled.stroke.duration
-    free.run(seconds)
-    coupled.run(seconds)
-    pushed_back = free.recording.vector("tip")[-1] - coupled.recording.vector("tip")[-1]
-    assert pushed_back[1] > 1e-5
 
 
 @pytest.mark.parametrize(

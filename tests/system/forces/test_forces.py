@@ -107,8 +107,14 @@ class Run:
 
 @pytest.mark.parametrize(
     "variation",
-    [{}, {"cells": (12, 12, 6)}, {"poses": upright(0.1)}, {"dt": 5e-4, "poses": upright(0.1)}],
-    ids=["as is", "finer", "faster", "shorter steps"],
+    [
+        {},
+        {"cells": (12, 12, 6)},
+        {"poses": upright(0.1)},
+        {"dt": 5e-4, "poses": upright(0.1)},
+        {"relaxation": "verlet"},
+    ],
+    ids=["as is", "finer", "faster", "shorter steps", "verlet"],
 )
 def test_the_steady_force_is_toughness_times_depth(variation):
     """In tissue that hardly dents: where a dent is made good, more is cut than the edge travels."""
@@ -264,19 +270,6 @@ def test_the_energy_balance_of_verlet_closes(stroke, off):
     poses, material = STROKES[stroke]
     run = Run(poses, blade=SCALPEL, relaxation="verlet", blade_friction=0.3, **material)
     assert abs(run.energies.residual) < off * run.energies.work_of_blade
-
-
-def test_an_audit_on_two_threads_is_that_on_one():
-    poses = upright()[:200]
-    one, two = (Run(poses, blade=SCALPEL, threads=threads) for threads in (1, 2))
-    assert two.energies == one.energies
-
-
-def test_cutting_takes_toughness_times_the_area_swept():
-    run = Run(upright(end=0.055), young_modulus=30e3)
-    area = 0.04 * 0.02
-    assert run.energies.cutting / TOUGHNESS == pytest.approx(area, rel=0.02)
-    assert run.results[-1].cut_area == pytest.approx(area, rel=0.1)
 
 
 @pytest.mark.parametrize("stroke", ["straight", "slanted", "slicing"])

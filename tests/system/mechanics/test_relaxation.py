@@ -7,7 +7,7 @@ import pytest
 
 from tests.support import bodies, strokes
 from tests.support.materials import SPRINGS
-from tests.system.energy.test_conservation import NO_GRAVITY, SLAB, momentum
+from tests.system.energy.test_conservation import NO_GRAVITY, SLAB
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block
 
 HIERARCHICAL = Hierarchical(updates=16, rings=3)
@@ -66,28 +66,6 @@ def test_the_cutting_force_is_toughness_times_length(relaxation):
     assert force == pytest.approx(20.0 * length, rel=0.02)
     apart = [r.wrench.force + r.force_on_tissue for r in results]
     assert np.abs(apart).max() < 1e-12
-
-
-@pytest.mark.parametrize("relaxation", ["verlet", "global"])
-@pytest.mark.parametrize("law", ["springs", "neo_hookean"])
-def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(law, relaxation):
-    """In every frame, through splits and substeps, without drag.
-
-    Without mass scaling: a node that gets mass, or that a cut takes it from, keeps its velocity.
-    """
-    mesh = bodies.jittered(4, 0)
-    material = Material(law=law, poisson_ratio=0.3, viscous_damping=0.0, toughness=5.0)
-    solver = SolverSettings(relaxation=relaxation, mass_scaling=None)
-    tissue = Tissue(mesh, material, gravity=NO_GRAVITY, solver=solver)
-    scale = float(tissue.snapshot().masses.sum())
-    n_cut = 0
-    for sweep in strokes.sweeps(strokes.slanted(mesh)):
-        before = momentum(tissue)[0]
-        result = tissue.step(sweep, strokes.DT)
-        gained = momentum(tissue)[0] - before
-        np.testing.assert_allclose(gained, -result.wrench.force * strokes.DT, atol=1e-12 * scale)
-        n_cut = result.n_tetrahedra
-    assert n_cut > len(mesh.tetrahedra)
 
 
 @pytest.mark.parametrize("law", LAWS)

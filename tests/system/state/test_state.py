@@ -111,7 +111,6 @@ CASES = {
 }
 
 LINES = {
-    "line, springs": Case(material=SPRINGS, blade=None),
     "line, stiffening": Case(material=Material(law="yeoh", yeoh_second=1.0), blade=None),
     "line, verlet": Case(SolverSettings(relaxation="verlet"), blade=None),
     "line, hierarchical": Case(SolverSettings(relaxation="hierarchical"), SPRINGS, blade=None),
@@ -160,13 +159,6 @@ def saved(request):
     return case, tissue, state, expected
 
 
-def test_what_follows_a_state_is_the_same_each_time_that_it_is_loaded(saved):
-    _, tissue, state, expected = saved
-    for _ in range(2):
-        tissue.load_state(state)
-        assert step(tissue, AFTER) == expected
-
-
 @pytest.mark.parametrize("case", [*CASES.values(), *LINES.values()], ids=[*CASES, *LINES])
 def test_from_each_instant_to_each_earlier_one_the_same_frames_follow(case):
     """Those of the body that was never put back: before contact, in it, mid-cut, at the end."""
@@ -198,17 +190,6 @@ def test_saving_changes_nothing():
     for sweep in AFTER:
         saving.save_state()
         assert step(saving, [sweep]) == step(other, [sweep])
-
-
-def test_a_hundred_branches_from_one_state_are_equal():
-    tissue = in_mid_cut(Case())
-    state = tissue.save_state()
-    branches = set()
-    for i in range(100):
-        tissue.load_state(state)
-        branches.add(step(tissue, AFTER[:3]))
-        step(tissue, AFTER[3 : 3 + i % 5])  # each is left at another time
-    assert len(branches) == 1
 
 
 def test_a_change_of_the_mesh_applies_to_a_body_put_back_to_before_another():
@@ -322,18 +303,13 @@ def test_a_state_of_another_version_is_refused(monkeypatch):
         tissue.load_state(TissueState.from_bytes(newer))
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.999])
-def test_bytes_of_which_the_end_is_missing_are_refused(share):
+def test_bytes_that_are_damaged_or_of_which_the_end_is_missing_are_refused():
     data = Case().make().save_state().to_bytes()
-    with pytest.raises(StateError, match="missing or damaged"):
-        TissueState.from_bytes(data[: int(share * len(data))])
-
-
-def test_damaged_bytes_are_refused():
-    data = bytearray(Case().make().save_state().to_bytes())
-    data[len(data) // 2] ^= 1
-    with pytest.raises(StateError, match="missing or damaged"):
-        TissueState.from_bytes(bytes(data))
+    damaged = bytearray(data)
+    damaged[len(data) // 2] ^= 1
+    for wrong in (bytes(damaged), *(data[: int(share * len(data))] for share in (0.0, 0.3, 0.999))):
+        with pytest.raises(StateError, match="missing or damaged"):
+            TissueState.from_bytes(wrong)
 
 
 def test_a_state_that_is_refused_leaves_the_body_as_it_was():

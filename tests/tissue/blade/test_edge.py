@@ -5,7 +5,6 @@ import pytest
 
 from tissue.blade.edge import (
     Edge,
-    blade_coordinates,
     displacement_of,
     motion_at,
     pose_at,
@@ -37,14 +36,6 @@ def test_the_axes_of_the_blade_are_orthonormal_and_the_edge_is_one_of_them():
     assert pose.length == pytest.approx(0.02)
 
 
-def test_samples_reach_from_the_tip_to_the_heel():
-    pose = pose_at(TURNING, 0.3)
-    points = np.array([sample_point(pose, k, 5) for k in range(5)])
-    np.testing.assert_allclose(points[0], pose.tip, atol=1e-17)
-    np.testing.assert_allclose(points[-1], pose.heel, atol=1e-17)
-    np.testing.assert_allclose(np.diff(points, axis=0), np.diff(points, axis=0)[[0]].repeat(4, 0))
-
-
 def test_a_sample_moves_from_its_position_in_the_first_pose_to_that_in_the_last():
     before, after = (sample_point(pose_at(TURNING, when), 3, 5) for when in (0.0, 1.0))
     moved = sample_displacement(TURNING, 3, 5)
@@ -61,9 +52,3 @@ def test_a_point_fixed_to_the_blade_moves_as_its_constant_coordinates_say(when):
     moved = displacement_of(motion, Vec3(*place(motion.pose).tolist()))
     expected = place(pose_at(TURNING, 1.0)) - place(pose_at(TURNING, 0.0))
     np.testing.assert_allclose(moved, expected, atol=1e-16)
-
-
-def test_blade_coordinates_are_measured_along_its_axes():
-    at = blade_coordinates(pose_at(STILL, 1.0), Vec3(0.002, -0.01, 0.014))
-    np.testing.assert_allclose(at[:2], [0.014, 0.01], atol=1e-15)
-    assert abs(at.across) == pytest.approx(0.002)

@@ -38,25 +38,20 @@ def in_slit(body, x, y, z, along=UP, forward=AHEAD) -> bool:
     return is_in_slit(body, t, p, along, forward, REACH)
 
 
-@pytest.mark.parametrize("x", [0.0195, 0.0205])
-def test_a_blade_along_a_cut_face_on_either_side_is_in_the_slit(slit_body, x):
-    assert in_slit(slit_body, x, 0.011, 0.033)
-
-
-def test_a_blade_several_reaches_beside_the_cut_is_in_whole_tissue(slit_body):
-    assert not in_slit(slit_body, 0.025, 0.011, 0.033)
-
-
-def test_a_blade_ahead_of_the_rim_is_in_whole_tissue(slit_body):
-    assert not in_slit(slit_body, 0.0201, 0.0207, 0.033)
-
-
-def test_a_blade_below_the_bottom_is_in_whole_tissue(slit_body):
-    assert not in_slit(slit_body, 0.0201, 0.011, 0.0193)
-
-
-def test_a_blade_that_crosses_the_slit_is_in_whole_tissue(slit_body):
-    assert not in_slit(slit_body, 0.0195, 0.011, 0.033, forward=ACROSS)
+@pytest.mark.parametrize(
+    ("place", "forward", "is_in"),
+    [
+        ((0.0195, 0.011, 0.033), AHEAD, True),
+        ((0.0205, 0.011, 0.033), AHEAD, True),
+        ((0.025, 0.011, 0.033), AHEAD, False),
+        ((0.0201, 0.0207, 0.033), AHEAD, False),
+        ((0.0201, 0.011, 0.0193), AHEAD, False),
+        ((0.0195, 0.011, 0.033), ACROSS, False),
+    ],
+    ids=["left", "right", "reaches beside", "ahead of the rim", "below the bottom", "across"],
+)
+def test_a_blade_along_a_cut_face_is_in_the_slit(slit_body, place, forward, is_in):
+    assert in_slit(slit_body, *place, forward=forward) == is_in
 
 
 @pytest.mark.parametrize("x", [0.0195, 0.0205])

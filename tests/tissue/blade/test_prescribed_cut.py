@@ -45,22 +45,6 @@ def test_a_sample_that_moves_back_waits_until_it_is_ahead_of_its_earlier_path(st
         assert cut.path.t1[0, 1] == pytest.approx(max(y, 0.3))
 
 
-def test_samples_inside_have_a_seed_tetrahedron_that_contains_them(started):
-    cut, cells = started
-    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD, 0.5)
-    for k in range(2):
-        corners = cut.body.rest[cut.body.tetrahedra[cut.path.seed[k]]]
-        assert (corners.min(axis=0) <= cut.path.t1[k]).all()
-        assert (cut.path.t1[k] <= corners.max(axis=0)).all()
-    assert cut.path.seed[2] == -1  # far above the body, as is the area that its segment sweeps
-
-
-def test_the_normal_of_the_blade_is_across_its_edge_and_its_motion(started):
-    cut, cells = started
-    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD, 0.5)
-    np.testing.assert_allclose(cut.path.sideways[0], [1.0, 0.0, 0.0], atol=1e-15)
-
-
 def test_an_edge_is_divided_into_pieces_no_longer_than_the_spacing():
     rows = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0], [1.0, 0.0, 2.0]]])
     finer = resampled(rows, 0.25, 100)

@@ -1,4 +1,4 @@
-"""Toughness is charged for the area of the body at rest."""
+"""Toughness is charged for the area of the body at rest, and in the skin."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from tissue import Material, block
 from tissue.blade.edge import Edge, pose_at
 from tissue.blade.edge_anchors import held_toughness, new_anchors
 from tissue.blade.return_mapping import AVERAGED_OVER, LARGEST_SHARE, set_anchor, update_rest_share
+from tissue.blade.toughness import skin_toughness_at, toughness_at, toughness_law_of
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import build_body
 
@@ -69,3 +70,18 @@ def test_an_anchor_beside_no_other_keeps_its_share(blade):
 def test_an_anchor_that_did_not_slip_keeps_its_share(blade):
     assert slip(blade, 0.0, 0.0) == 1.0
     assert np.isfinite(blade.anchors.rest_share).all()
+
+
+def test_skin_is_never_weaker_than_the_tissue_below():
+    skinned = Material(toughness=20.0, skin_toughness=50.0)
+    assert toughness_law_of(skinned, None).skin_toughness == 50.0
+    assert toughness_law_of(Material(toughness=20.0), None).skin_toughness == 20.0
+
+
+def test_skin_costs_at_least_what_the_speed_asks_for():
+    material = Material(
+        toughness=20.0, skin_toughness=50.0, toughness_exponent=0.5, toughness_speed=0.1
+    )
+    law = toughness_law_of(material, None)
+    assert skin_toughness_at(law, 0.1) == 50.0  # the tissue below has 40 J/m2
+    assert skin_toughness_at(law, 0.9) == toughness_at(law, 0.9) == pytest.approx(80.0)

@@ -1,15 +1,13 @@
-"""Contacts of two blocks are those that a test of all pairs finds, and keep momentum and torque."""
+"""Contacts of two blocks are those that a test of all pairs finds, and go on as they were."""
 
 import numpy as np
 import pytest
 
 from tests.support.overlaps import joined
 from tissue import block
-from tissue.contact.response.forces import add_contact_forces
+from tissue.contact.response.contacts import SAME_DIRECTION
 from tissue.contact.self_contact import SelfContact
 from tissue.mesh.body import build_body
-
-pytestmark = pytest.mark.kernel
 
 SIZE = 0.01
 """Size of a node [m]."""
@@ -48,6 +46,7 @@ def rows_of(contact):
     return slice(forces.first, forces.first + forces.n_contacts)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("seed", range(3))
 def test_each_node_within_reach_over_a_face_has_one_contact_with_weights_of_its_foot(seed):
     body, is_upper = overlapping(-2e-4, seed)
@@ -67,23 +66,7 @@ def test_each_node_within_reach_over_a_face_has_one_contact_with_weights_of_its_
     assert (towards > 0.9).all()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_forces_of_contacts_have_neither_sum_nor_torque(seed):
-    body, is_upper = overlapping(-1e-4, seed)
-    contact = searched(body)
-    random, n = np.random.default_rng(seed), body.n_nodes
-    body.positions[:n][is_upper] -= [0.0, 0.0, 4e-4]
-    body.positions[:n] += random.normal(scale=1e-4, size=(n, 3))
-    body.velocities[:n] = random.normal(scale=0.05, size=(n, 3))
-    external = np.zeros_like(body.positions)
-    add_contact_forces(contact.forces, body.positions, body.velocities, 1e-3, external)
-    size = np.abs(external).sum()
-    assert size > 0.0
-    np.testing.assert_allclose(external.sum(axis=0), 0.0, atol=1e-12 * size)
-    torque = np.cross(body.positions, external).sum(axis=0)
-    np.testing.assert_allclose(torque, 0.0, atol=1e-10 * size * SIZE)
-
-
+@pytest.mark.kernel
 def test_nodes_near_the_floor_have_one_contact_with_it():
     body, _ = overlapping(-1e-2)
     contact = searched(body, floor=-4e-4)
@@ -93,6 +76,86 @@ def test_nodes_near_the_floor_have_one_contact_with_it():
     np.testing.assert_array_equal(forces.height[rows], -4e-4)
 
 
+@pytest.mark.kernel
 def test_blocks_that_are_far_apart_have_no_contact():
     body, _ = overlapping(-2e-3)
     assert not searched(body).is_touching
+
+
+CARRIED = ("node", "weight", "normal", "stiffness", "offset", "anchor", "push")
+
+
+def search_again(contact, body):
+    """Search in another time step."""
+    with np.errstate(all="ignore"):  # rows that fill eight are empty
+        contact.begin()
+        contact.prepare(body, np.zeros(len(body.rest)), HIGHEST, np.inf, 1e-3)
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("seed", range(4))
+def test_no_two_contacts_of_a_node_are_in_one_direction(seed):
+    body, is_upper = overlapping(-1e-4, seed)
+    random, most = np.random.default_rng(seed), 0
+    body.positions[: len(is_upper)] += random.normal(scale=1e-3, size=(len(is_upper), 3))
+    contact = searched(body)
+    forces, search = contact.forces, contact.search
+    for node in search.pairs.nodes[: search.pairs.n_nodes]:
+        normals = forces.normal[search.contact[node] :][: search.n_contacts[node]]
+        assert len(normals) <= 3
+        cosines = normals @ normals.T - np.eye(len(normals))
+        assert (cosines <= SAME_DIRECTION).all()
+        most = max(most, len(normals))
+    assert most > 0
+
+
+@pytest.mark.kernel
+def test_contacts_of_nodes_that_do_not_move_go_on_as_they_are_in_another_list():
+    body, _ = overlapping(-1e-4)
+    contact = searched(body)
+    forces, n = contact.forces, contact.forces.n_contacts
+    before = {name: getattr(forces, name)[rows_of(contact)].copy() for name in CARRIED}
+    contact.search.is_listing_due, first = 1, forces.first
+    search_again(contact, body)
+    assert (forces.n_contacts, forces.first == first) == (n, False)
+    for name, values in before.items():
+        np.testing.assert_array_equal(getattr(forces, name)[rows_of(contact)], values, name)
+
+
+@pytest.mark.kernel
+def test_what_pressed_and_is_no_longer_found_fades_and_what_did_not_ends():
+    body, is_upper = overlapping(-1e-4)
+    contact = searched(body)
+    forces, n = contact.forces, contact.forces.n_contacts
+    forces.push[rows_of(contact)] = 0.0
+    pressing = rows_of(contact).start + 1
+    forces.push[pressing], node = 1e-2, forces.node[pressing, 0]
+    body.positions[: len(is_upper)][is_upper] += [0.0, 0.0, 5e-3]
+    search_again(contact, body)
+    assert n > 1
+    assert (forces.n_contacts, forces.n_fading) == (1, 1)
+    assert forces.node[rows_of(contact), 0] == [node]
+
+
+def inside(body, t):
+    """Return the nodes with barycentric weights above 0.02 in a tetrahedron that is not theirs."""
+    corners = body.positions[body.tetrahedra[t]]
+    matrix = np.vstack([corners.T, np.ones(4)])
+    x = np.vstack([body.positions[: body.n_nodes].T, np.ones(body.n_nodes)])
+    weights = np.linalg.solve(matrix, x)
+    found = np.flatnonzero(weights.min(axis=0) > 0.02)
+    return set(map(int, found)) - set(map(int, body.tetrahedra[t]))
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("seed", range(3))
+def test_nodes_in_tetrahedra_of_another_part_are_found(seed):
+    body, _ = overlapping(0.4 * SIZE, seed)
+    contact = searched(body, n=1)
+    wanted = set().union(*(inside(body, t) for t in range(body.n_tetrahedra)))
+    has_contact = set(map(int, contact.forces.node[rows_of(contact), 0]))
+    contact = searched(body, n=4)
+    pairs = contact.search.pairs
+    found = set(map(int, np.flatnonzero(pairs.is_penetrating)))
+    assert found == wanted - has_contact
+    assert found

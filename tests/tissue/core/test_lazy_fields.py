@@ -1,7 +1,9 @@
 """A tuple whose fields are made when they are asked for acts as a plain one."""
 
 import copy
+import gc
 import pickle
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from tests.bridge.bits import bits
 from tissue import BladeSegment, Wrench
+from tissue.core.attributes import attributes_of, set_attributes
 from tissue.core.lazy_fields import lazy_fields
 
 NUMBERS = tuple(float(i) for i in range(9))
@@ -93,3 +96,80 @@ def test_the_numbers_follow_an_array_that_is_changed(kind):
 def test_the_numbers_of_a_vector_that_is_none_are_refused():
     with pytest.raises(ValueError, match="not enough values"):
         _ = BladeSegment(np.zeros(2), np.zeros(3), np.zeros(3)).numbers
+
+
+def test_a_wrench_about_another_point_does_the_same_work_on_any_motion():
+    random = np.random.default_rng(3)
+    force, torque, point, other, velocity, turning = random.normal(size=(6, 3))
+    there = Wrench(force, torque, point).about(other)
+    power = force @ (velocity + np.cross(turning, point)) + torque @ turning
+    assert there.point == pytest.approx(other)
+    assert there.force @ (velocity + np.cross(turning, other)) + there.torque @ turning == (
+        pytest.approx(power)
+    )
+
+
+class Owner:
+    """An object with defaults, a computed attribute and attributes that come and go."""
+
+    count = 0
+    other: object = None
+    name: str
+
+    def __init__(self):
+        self.items = [1, 2]
+        self._twice = 2 * len(self.items)
+
+    @property
+    def size(self):
+        return len(self.items)
+
+    @size.setter
+    def size(self, size):
+        self.set_size = size
+
+    def begin(self):
+        self.count, self.begun = 0, True
+
+
+def has_dictionary(owner):
+    return any(isinstance(each, dict) for each in gc.get_referents(owner))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda owner: None,
+        lambda owner: owner.begin(),
+        lambda owner: setattr(owner, "size", 3),
+        lambda owner: setattr(owner, "other", None),
+        lambda owner: setattr(owner, "other", owner.items),
+        lambda owner: setattr(owner, "name", "a"),
+    ],
+)
+def test_they_are_those_in_the_dictionary(change):
+    owner = Owner()
+    change(owner)
+    found = attributes_of(owner)
+    assert not has_dictionary(owner) or sys.version_info[:2] > (3, 12)
+    assert found == vars(owner)
+
+
+def test_a_name_that_is_not_in_the_code_of_the_class_is_found():
+    owner = Owner()
+    setattr(owner, "from " + "elsewhere", 1)
+    assert attributes_of(owner) == {"items": [1, 2], "_twice": 4, "from elsewhere": 1}
+
+
+@pytest.mark.parametrize("has_dict", [False, True])
+def test_an_object_gets_those_it_had(has_dict):
+    owner = Owner()
+    if has_dict:
+        vars(owner)["kept"] = 5
+    before = attributes_of(owner)
+    owner.begin()
+    owner.items, owner.size, owner.other = [], 3, True
+    del owner._twice
+    set_attributes(owner, before, frozenset({"begun"}))
+    assert vars(owner) == before | {"begun": True}
+    assert owner.items is before["items"]

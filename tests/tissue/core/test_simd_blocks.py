@@ -9,6 +9,7 @@ from tissue.core.simd_blocks import (
     alike,
     gathered_alike,
     load_block,
+    logarithm,
     points_of_rows,
     row_of_lane,
     store_block,
@@ -21,8 +22,6 @@ from tissue.core.simd_blocks import (
     width_of,
 )
 from tissue.core.simd_rows import larger, largest, where_larger
-
-pytestmark = pytest.mark.kernel
 
 REALS = {"double": np.float64, "single": np.float32}
 OF = np.random.default_rng(2).integers(0, 40, 32).astype(np.int32)
@@ -62,6 +61,7 @@ def arithmetic(values, out):
     store_block(out, width, where_larger(a, b, a / b, larger(a, alike(1.0, a)) - b))
 
 
+@pytest.mark.kernel
 def test_a_block_holds_eight_doubles_or_sixteen_singles(real):
     values = filled(48, real)
     width = 64 // values.itemsize
@@ -76,6 +76,7 @@ def folds(values, out):
     out[0], out[1] = largest(a), sum_of_lanes(a)
 
 
+@pytest.mark.kernel
 def test_a_block_is_folded_to_a_double(real):
     values = filled(16, real)
     compiled, plain = both(folds, values, out=np.zeros(2))
@@ -88,6 +89,7 @@ def converted(values, doubles, of, out):
     store_block(out, 0, gathered_alike(a, doubles, of, 0) * a)
 
 
+@pytest.mark.kernel
 def test_doubles_are_gathered_in_the_precision_of_the_block(real):
     values, doubles = filled(16, real), filled(40, np.float64, 1)
     width = 64 // values.itemsize
@@ -101,6 +103,7 @@ def transposed(rows, of, out):
     store_rows(out, width_of(rows), x, y, z)
 
 
+@pytest.mark.kernel
 def test_rows_are_gathered_as_points_and_stored_again_as_rows(real):
     rows = filled(4 * 40, real).reshape(40, 4)
     rows[:, 3] = 0.0
@@ -119,6 +122,7 @@ def spread_values(values, of, rows, out):
     store_block(out, 0, values_of_rows(rows, of, 8))
 
 
+@pytest.mark.kernel
 def test_numbers_of_rows_are_gathered(real):
     values, rows = filled(40, real), aligned(4 * 40, real).reshape(-1, 4)
     width = 64 // values.itemsize
@@ -132,6 +136,7 @@ def summed(rows, of, points, out):
     store_point(out, 0, sum_of_eight_rows(rows, of, 8))
 
 
+@pytest.mark.kernel
 def test_eight_rows_are_summed_to_a_point_of_doubles(real):
     rows, points = filled(4 * 40, real).reshape(40, 4), filled(9, np.float64, 3).reshape(3, 3)
     rows[:, 3] = 0.0
@@ -140,3 +145,35 @@ def test_eight_rows_are_summed_to_a_point_of_doubles(real):
     np.testing.assert_array_equal(rows[2, :3], points[1].astype(real))
     expected = rows[OF[8:16], :3].astype(np.float64).sum(axis=0)
     np.testing.assert_allclose(plain[0], expected, rtol=8 * np.finfo(real).eps)
+
+
+@kernel
+def logarithms(values, out):
+    width = 64 // values.itemsize
+    for i in range(0, len(values), width):
+        store_block(out, i, logarithm(load_block(values, i)))
+
+
+def found(values):
+    """Return the logarithms of as many numbers as fill vectors."""
+    given, out = aligned(len(values), values.dtype.type), aligned(len(values), values.dtype.type)
+    given[:] = values
+    logarithms(given, out)
+    return out
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+def test_a_logarithm_is_right_to_two_units_in_the_last_place(real):
+    limits, random = np.finfo(real), np.random.default_rng(0)
+    wide = np.exp(random.uniform(np.log(limits.tiny), np.log(limits.max), 4096))
+    near_one = 1.0 + random.uniform(-0.6, 0.6, 4096) ** 9
+    values = np.concatenate([wide, near_one]).astype(real)
+    expected = np.log(values.astype(np.longdouble))
+    allowed = 2.0 * np.maximum(np.spacing(np.abs(expected).astype(real)), limits.tiny)
+    assert (np.abs(found(values) - expected) <= allowed).all()
+
+
+@pytest.mark.parametrize("real", [np.float64, np.float32])
+def test_what_is_not_finite_has_no_logarithm(real):
+    values = np.resize(np.array([np.nan, np.inf], real), 16)
+    assert np.isnan(found(values)).all()

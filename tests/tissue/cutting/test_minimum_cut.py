@@ -51,31 +51,6 @@ def scipy_area(body, plus, minus):
     return maximum_flow(csr_array(capacity.astype(np.int32)), n, n + 1).flow_value * unit * 1e3
 
 
-def test_two_tetrahedra_are_parted_by_the_face_that_they_share():
-    """Its corners are at distance 1 on the axes: sqrt(3) / 2."""
-    pair = Graph(bodies.two_tetrahedra())
-    pair.put([0], [1])
-    assert pair.area() == pytest.approx(np.sqrt(3.0) / 2.0, rel=1e-12)
-    assert pair.side() == [0]
-
-
-def test_lips_that_nothing_joins_have_no_area_between_them():
-    pair = Graph(bodies.two_tetrahedra())
-    pair.body.links[pair.body.links >= 0] = CUT
-    pair.put([0], [1])
-    assert pair.area() == 0.0
-    assert pair.side() == [0]
-
-
-def test_a_bar_is_parted_by_its_section_wherever_its_ends_are():
-    """1 x 2 x 6: no surface between the ends is smaller than 1 x 2."""
-    mesh = block((1, 2, 6), (1.0, 2.0, 6.0))
-    heights = mesh.positions[mesh.tetrahedra].mean(axis=1)[:, 2]
-    bar = Graph(mesh)
-    bar.put(np.flatnonzero(heights < 1.0), np.flatnonzero(heights > 5.0))
-    assert bar.area() == pytest.approx(2.0, rel=1e-12)
-
-
 def test_a_search_ends_where_the_area_is_above_the_limit():
     mesh = block((1, 2, 6), (1.0, 2.0, 6.0))
     bar = Graph(mesh)

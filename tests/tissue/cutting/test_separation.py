@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support import bodies, naive, soundness
+from tests.support import bodies, soundness
 from tests.tissue.cutting.upright_edge import put_edge
 from tests.tissue.kernels_of import cut_of
 from tissue import block
@@ -11,7 +11,7 @@ from tissue.cutting.cut_surface import decide_side, note_side
 from tissue.cutting.separation import open_cut_surface, tetrahedron_side
 from tissue.cutting.workspace import flag
 from tissue.mesh.body import CUT
-from tissue.mesh.changes import NODES, clear_changes
+from tissue.mesh.changes import NODES
 
 pytestmark = pytest.mark.kernel
 
@@ -52,25 +52,6 @@ def test_where_there_is_no_room_to_double_a_node_the_cut_says_so():
     roomy = two_halves()
     open_cut_surface(roomy)
     assert roomy.change.lacks_room == 0
-
-
-def test_copies_have_the_position_of_the_node_and_refer_to_each_other():
-    cut = two_halves()
-    open_cut_surface(cut)
-    for copy in range(12, 16):
-        node = cut.body.twin[copy]
-        assert cut.body.twin[node] == copy
-        np.testing.assert_array_equal(cut.body.rest[copy], cut.body.rest[node])
-
-
-def test_separating_an_open_cut_surface_again_changes_nothing():
-    cut = two_halves()
-    open_cut_surface(cut)
-    tetrahedra = mesh_of(cut).copy()
-    clear_changes(cut.change)
-    open_cut_surface(cut)
-    np.testing.assert_array_equal(mesh_of(cut), tetrahedra)
-    assert cut.change.n_faces == 0
 
 
 def test_a_face_with_a_node_off_the_cut_surface_is_not_cut():
@@ -116,13 +97,6 @@ def test_a_piece_smaller_than_a_fragment_stays_with_the_body():
     open_cut_surface(cut)
     assert soundness.n_pieces(mesh_of(cut)) == 1
     assert cut.body.n_nodes == 12
-
-
-def test_links_after_a_cut_are_those_built_from_scratch():
-    cut = two_halves()
-    open_cut_surface(cut)
-    links = cut.body.links[: len(mesh_of(cut))]
-    np.testing.assert_array_equal(np.maximum(links, -1), naive.links(mesh_of(cut)))
 
 
 # The side of a tetrahedron.

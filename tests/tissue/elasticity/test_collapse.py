@@ -219,20 +219,11 @@ def tissue_of(mesh: TetrahedralMesh, positions: FloatArray, fixed, relaxation: s
     )
 
 
-@pytest.mark.parametrize("relaxation", ["global", "verlet"])
-def test_a_tetrahedron_that_is_its_mirror_image_turns_back(relaxation):
-    fixed = np.array([True, True, True, False])
-    tissue = tissue_of(ONE, squeezed(ONE, -1.0), fixed, relaxation)
-    for _ in range(2000):
-        tissue.step(None, 1e-3)
-    assert tissue.snapshot().positions == pytest.approx(CORNERS, abs=1e-3 * SIZE)
-
-
 @pytest.mark.parametrize(
     ("relaxation", "error"),
     [("global", 0.01), ("verlet", 0.05)],  # of fourth and of second order, at 9 m/s
 )
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_block_recovers_from_random_positions_and_its_account_closes(relaxation, error, seed):
     mesh = block((3, 3, 3), (0.03, 0.03, 0.03))
     fixed = mesh.positions[:, 0] <= mesh.positions[:, 0].min() + 1e-9

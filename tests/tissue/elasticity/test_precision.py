@@ -28,20 +28,6 @@ def test_forces_in_single_precision_are_those_in_double(law):
 
 
 @in_kernels
-@pytest.mark.parametrize("is_single", [False, True])
-def test_a_body_at_rest_is_without_force_in_either_precision(is_single):
-    for law in LAWS.values():
-        assert (solid_of(MESH, law, is_single=is_single).forces(MESH.positions) == 0.0).all()
-
-
-@in_kernels
-def test_the_forces_of_the_tetrahedra_balance_in_single_precision():
-    single = solid_of(MESH, LAWS["averaged"], is_single=True)
-    forces = single.forces(moved(MESH))
-    assert np.abs(forces.sum(axis=0)).max() < LARGEST_ERROR * np.abs(forces).max()
-
-
-@in_kernels
 def test_the_energy_in_single_precision_is_that_in_double():
     for law in LAWS.values():
         double, single = solid_of(MESH, law), solid_of(MESH, law, is_single=True)

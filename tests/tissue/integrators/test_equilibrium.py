@@ -102,8 +102,11 @@ def test_a_body_that_nothing_holds_is_not_settled_and_stays_as_it_is():
         tissue.settle()
     np.testing.assert_array_equal(tissue.snapshot().positions, CUBE.positions)
     raised = Tissue(CUBE, Material(), floor=-1e-6, gravity=(0.0, 0.0, 9.81))
-    with pytest.raises(TissueError, match="nothing holds it"):
+    with pytest.raises(
+        TissueError, match=r"nothing holds it.*do not press it on the floor"
+    ) as error:
         raised.settle()
+    assert "put a floor" not in str(error.value)
 
 
 def test_a_load_on_a_body_that_nothing_holds_is_refused_unless_it_balances():
@@ -213,10 +216,3 @@ def test_a_body_that_gives_way_under_a_load_is_not_told_that_it_is_too_heavy():
     with pytest.raises(TissueError, match="less gravity, load or stretch") as error:
         tissue.settle()
     assert "weight" not in str(error.value)
-
-
-def test_a_body_that_is_pulled_off_its_floor_is_not_told_to_put_a_floor_below_it():
-    raised = Tissue(CUBE, Material(), floor=-1e-6, gravity=(0.0, 0.0, 9.81))
-    with pytest.raises(TissueError, match="do not press it on the floor") as error:
-        raised.settle()
-    assert "put a floor" not in str(error.value)

@@ -96,40 +96,29 @@ def cube(relaxation="global", **quantities):
 
 
 @pytest.mark.parametrize(
-    ("quantities", "dt"),
-    [
-        ({}, 1e6),
-        ({"young_modulus": 1e15}, 1e-3),
-        ({"density": 1e-6}, 1e-3),
-        ({"retardation_time": 1e6}, 1e-3),
-        ({"viscous_damping": 1e12}, 1e-3),
-    ],
-)
-@pytest.mark.parametrize("relaxation", METHODS)
-def test_a_step_without_end_is_refused_and_changes_nothing(quantities, dt, relaxation):
-    tissue, other = cube(relaxation, **quantities), cube(relaxation, **quantities)
-    before = tissue.save_state().to_bytes()
-    with pytest.raises(ValueError, match=MANY) as refused:
-        tissue.step(None, dt)
-    assert tissue.save_state().to_bytes() == before
-    longest = float(re.search(MANY, str(refused.value))[2])
-    short = 1e-3 * longest
-    assert tissue.step(None, short).n_substeps == other.step(None, short).n_substeps
-    assert tissue.snapshot().positions.tobytes() == other.snapshot().positions.tobytes()
-
-
-@pytest.mark.parametrize(
     ("quantities", "dt", "reason"),
     [
         ({}, 1e6, "elements are small"),
+        ({"young_modulus": 1e15}, 1e-3, ""),
+        ({"density": 1e-6}, 1e-3, ""),
         ({"retardation_time": 1e6}, 1e-3, "damping"),
         ({"viscous_damping": 1e12}, 1e-3, "damping"),
     ],
 )
 @pytest.mark.parametrize("relaxation", METHODS)
-def test_the_reason_is_the_one_that_is_there(quantities, dt, reason, relaxation):
-    with pytest.raises(ValueError, match=rf"because .*{reason}.*; at most"):
-        cube(relaxation, **quantities).step(None, dt)
+def test_a_step_without_end_is_refused_with_its_reason_and_changes_nothing(
+    quantities, dt, reason, relaxation
+):
+    tissue, other = cube(relaxation, **quantities), cube(relaxation, **quantities)
+    before = tissue.save_state().to_bytes()
+    with pytest.raises(ValueError, match=MANY) as refused:
+        tissue.step(None, dt)
+    assert tissue.save_state().to_bytes() == before
+    found, longest = re.search(MANY, str(refused.value)).groups()
+    assert reason in found
+    short = 1e-3 * float(longest)
+    assert tissue.step(None, short).n_substeps == other.step(None, short).n_substeps
+    assert tissue.snapshot().positions.tobytes() == other.snapshot().positions.tobytes()
 
 
 def test_springs_that_hold_it_too_stiffly_are_named_as_the_reason():

@@ -38,22 +38,6 @@ def touched(monkeypatch):
     return tissue
 
 
-def test_the_struct_is_current_where_contacts_with_geoms_need_more_room(touched):
-    model = touched._model
-    first = model.context
-    touched.step(None, strokes.DT)
-    assert is_current(model) and model.context is not first
-    assert len(model.geoms.arrays.geom) > 2
-
-
-def test_the_struct_is_current_where_a_body_that_touches_geoms_settles(touched):
-    model = touched._model
-    first = model.context
-    touched.settle()
-    assert is_current(model) and model.context is not first
-    assert len(model.geoms.arrays.geom) > 2
-
-
 def test_the_struct_is_current_after_each_step_of_a_cut_with_attachments(touched):
     nodes = np.flatnonzero(MESH.positions[:, 2] > TOP[2] - 1e-6)[:4]
     for i, sweep in enumerate(strokes.sweeps(strokes.THROUGH["slanted"](MESH))):

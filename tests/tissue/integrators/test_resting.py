@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support import bodies, strokes
-from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, TissueError, block
-from tissue.integrators.equilibrium import LONGEST_SETTLING
+from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, block
 
 CUBE = block((3, 3, 3), (0.03,) * 3)
 RELAXATIONS = ("global", "verlet")
@@ -21,27 +20,6 @@ def calm_body(relaxation, **options):
         result = tissue.step(None, strokes.DT)
     assert result.n_substeps == 0
     return tissue
-
-
-@pytest.mark.parametrize("relaxation", RELAXATIONS)
-def test_a_body_that_has_settled_takes_no_steps_and_stays_as_it_is(relaxation):
-    solver = SolverSettings(relaxation=relaxation)
-    tissue = Tissue(CUBE, Material(), fixed=bodies.sides(CUBE), solver=solver)
-    assert tissue.settle() < LONGEST_SETTLING
-    before = tissue.snapshot().positions
-    assert sum(tissue.step(None, strokes.DT).n_substeps for _ in range(100)) == 0
-    np.testing.assert_array_equal(tissue.snapshot().positions, before)
-
-
-def test_a_body_that_nothing_holds_does_not_settle_and_falls_on():
-    tissue = Tissue(CUBE, Material())
-    with pytest.raises(TissueError, match="nothing holds it"):
-        tissue.settle()
-    before = tissue.snapshot().velocities[:, 2]
-    assert tissue.step(None, strokes.DT).n_substeps > 0
-    np.testing.assert_allclose(
-        tissue.snapshot().velocities[:, 2], before - 9.81 * strokes.DT, rtol=1e-2
-    )
 
 
 @pytest.mark.parametrize("relaxation", RELAXATIONS)

@@ -132,12 +132,6 @@ def test_a_tetrahedron_under_another_type_is_refused_and_not_lost(name, wrong, m
     assert message in refusal_of(tmp_path, name, data)
 
 
-@pytest.mark.parametrize("name", ["vtk 2.0 text.vtk", "vtk 5.1 text.vtk", "text.vtu"])
-def test_a_triangle_under_the_type_of_a_line_is_refused(name, tmp_path):
-    data = FILES[name].replace(b"1 3 5 10", b"1 3 3 10")
-    assert "cell 2 is one of the lines and has 3 nodes, not 2" in refusal_of(tmp_path, name, data)
-
-
 def test_offsets_that_end_before_the_nodes_do_are_refused(tmp_path):
     n = int(
         re.search(rb"CONNECTIVITY vtktypeint64\n(.*)\n", FILES["vtk 5.1 text.vtk"])[0].count(b" ")

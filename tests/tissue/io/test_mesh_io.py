@@ -1,6 +1,5 @@
 import os
 import socket
-from pathlib import Path
 
 import meshio
 import numpy as np
@@ -332,24 +331,6 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path):
 
 
 # ------------------------------------------------------------------ third-party meshes
-
-
-@pytest.mark.skipif("SCALPEL_SIM_TEST_MESHES" not in os.environ, reason="no folder of meshes given")
-@pytest.mark.parametrize(
-    ("name", "n_nodes", "n_tetrahedra"),
-    [
-        ("sofa_liver.msh", 181, 596),
-        ("sofa_truthcylinder1.msh", 642, 2524),
-        ("bullet_banana.vtk", 725, 2395),
-        ("sofaenv_tissue_volume.msh", 493, 1432),
-    ],
-)
-def test_public_meshes_are_read_and_can_be_held_by_their_sides(name, n_nodes, n_tetrahedra):
-    mesh = read_mesh(Path(os.environ["SCALPEL_SIM_TEST_MESHES"]) / name, 0.01)
-    assert mesh.positions.shape == (n_nodes, 3)
-    assert mesh.tetrahedra.shape == (n_tetrahedra, 4)
-    for side in ("left", "right"):
-        assert 3 <= side_nodes(mesh, [side]).sum() < n_nodes / 4
 
 
 def shuffled(mesh):

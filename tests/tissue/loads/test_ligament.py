@@ -134,46 +134,6 @@ def test_momenta_of_a_free_body_change_by_what_blade_and_world_feel():
 # What the edge does not cut
 
 
-@pytest.mark.parametrize(
-    "beside",
-    [
-        {"x": (-0.01, 0.019)},
-        {"z": 0.081},
-        {"forward": -1.0},
-    ],
-    ids=["its tip passes short of it", "above its end", "with its back ahead"],
-)
-def test_a_blade_that_does_not_sweep_its_edge_across_a_fibre_leaves_it(beside):
-    tissue = cube()
-    ligament = tied(tissue)
-    results = sweep(tissue, 0.01, 0.03, **beside)
-    assert all((result.wrench.force == 0.0).all() for result in results)
-    assert ligament.n_points == 1
-
-
-def test_a_blade_that_stands_still_cuts_nothing():
-    tissue = cube()
-    ligament = tied(tissue, rest_length=0.03)
-    for _ in range(30):
-        tissue.step(BladeSweep(edge(0.0201), edge(0.0201)), DT)
-    assert ligament.n_points == 1
-
-
-def test_an_edge_along_a_fibre_cuts_nothing():
-    tissue = cube()
-    ligament = tied(tissue)
-    for y in np.arange(0.019, 0.021, 1e-4):
-        a, b = (
-            BladeSegment(
-                np.array([0.02, v, 0.05]), np.array([0.02, v, 0.07]), np.array([0, 1.0, 0])
-            )
-            for v in (y, y + 1e-4)
-        )
-        result = tissue.step(BladeSweep(a, b), DT)
-        np.testing.assert_array_equal(result.wrench.force, 0.0)
-    assert ligament.n_points == 1
-
-
 def test_a_fibre_that_the_blade_backs_off_from_lies_straight_and_holds_as_before():
     tissue = cube(audit=True)
     ligament = tied(tissue)
@@ -197,15 +157,6 @@ def test_a_slack_fibre_goes_with_the_edge_and_is_cut_once_it_is_taut():
     taut = sweep(tissue, 0.0302, 0.05)
     assert ligament.n_points == 0
     assert min(result.wrench.force[1] for result in taut) < -0.9 * RESISTANCE
-
-
-def test_a_blade_that_is_taken_away_lets_go():
-    tissue = cube(audit=True)
-    ligament = tied(tissue)
-    sweep(tissue, 0.01, 0.028)
-    energies = last(tissue).energies
-    assert ligament.n_points == 1 and energies.held == pytest.approx(0.0, abs=1e-9)
-    assert abs(energies.residual) < 5e-3 * energies.work_of_blade
 
 
 # Several

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support import bodies, soundness, strokes
+from tests.support import soundness, strokes
 from tissue import Material, TetrahedralMesh, Tissue, block
 from tissue.mesh.body import build_body
 from tissue.mesh.pieces import (
@@ -71,25 +71,6 @@ def test_a_spinning_piece_has_the_given_velocities(cut):
     np.testing.assert_allclose(small.angular_velocity, w, atol=1e-9)
     np.testing.assert_allclose(small.angular_momentum, small.inertia @ w, atol=1e-15)
     np.testing.assert_allclose(small.inertia, small.inertia.T)
-
-
-def test_equal_pieces_are_in_the_order_of_their_tetrahedra():
-    two = bodies.unit_tetrahedron()
-    mesh = two._replace(
-        positions=np.vstack([two.positions, two.positions + 3.0]) * 0.01,
-        tetrahedra=np.array([[4, 5, 6, 7], [0, 1, 2, 3]]),
-    )
-    assert Tissue(mesh).piece_of_tetrahedra().tolist() == [0, 1]
-
-
-def test_a_loose_piece_falls_and_a_held_one_does_not():
-    tissue = cut_block(weight=9.81)
-    before = tissue.pieces()
-    for _ in range(100):
-        tissue.step(None, strokes.DT)
-    large, small = tissue.pieces()
-    assert small.velocity[2] < before[1].velocity[2] - 0.3
-    assert large.centre[2] == pytest.approx(before[0].centre[2], abs=1e-3)
 
 
 CELL = block((1, 1, 1), (0.01,) * 3)

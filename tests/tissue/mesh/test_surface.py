@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.support import bodies, soundness, strokes
+from tests.support import bodies, naive, soundness, strokes
 from tissue import Tissue, block
 from tissue.mesh.body import CUT, build_body
 from tissue.mesh.pieces import label_pieces
+from tissue.mesh.star import LARGEST_STAR, edge_star, mean_node_size, no_visits, node_size, star
 from tissue.mesh.surface import boundary_surface
 
 CUBE = block((2, 2, 2), (0.04, 0.04, 0.04))
@@ -26,12 +27,6 @@ def test_the_surface_of_a_cube_is_its_six_sides_facing_outwards():
     assert enclosed_volume(surface) == pytest.approx(0.04**3)
     assert soundness.is_closed(surface.triangles)
     assert not surface.is_cut.any()
-
-
-@pytest.mark.kernel
-def test_the_surface_of_a_single_tetrahedron_is_its_four_faces():
-    surface = boundary_surface(build_body(bodies.unit_tetrahedron(), None, None))
-    assert enclosed_volume(surface) == pytest.approx(1 / 6)
 
 
 @pytest.mark.kernel
@@ -59,10 +54,43 @@ def test_the_faces_of_a_cut_are_on_the_surface_twice(stroke):
     assert soundness.is_closed(surface.triangles)
 
 
-def test_every_vertex_of_the_surface_is_used():
-    mesh = bodies.jittered(3, 0)
-    tissue = Tissue(mesh, fixed=bodies.sides(mesh))
-    strokes.make(tissue, strokes.curved(mesh))
-    surface = tissue.surface()
-    np.testing.assert_array_equal(np.unique(surface.triangles), np.arange(len(surface.positions)))
-    assert len(surface.rest_positions) == len(surface.positions)
+MESHES = {"grid": block((2, 2, 2), (1.0, 1.0, 1.0)), "jittered": bodies.jittered(3, 4, size=1.0)}
+
+
+@pytest.fixture(params=MESHES)
+def mesh(request):
+    return MESHES[request.param]
+
+
+@pytest.fixture
+def around(mesh):
+    """Return the body, its visit marks and the scratch array of a search."""
+    visits = no_visits(len(mesh.positions), len(mesh.tetrahedra))
+    return build_body(mesh, None, None), visits, np.zeros(LARGEST_STAR, dtype=np.int64)
+
+
+@pytest.mark.kernel
+def test_the_star_of_a_node_is_every_tetrahedron_with_that_node(mesh, around):
+    body, visits, out = around
+    for node in range(len(mesh.positions)):
+        n = star(body, visits, node, body.node_tetrahedron[node], out)
+        assert len(set(out[:n])) == n
+        assert set(out[:n].tolist()) == naive.star(mesh.tetrahedra, node)
+
+
+@pytest.mark.kernel
+def test_the_star_of_an_edge_is_every_tetrahedron_with_both_ends(mesh, around):
+    body, visits, out = around
+    for a, b in mesh.tetrahedra[:, :2]:
+        n = edge_star(body, visits, a, b, out)
+        both = naive.star(mesh.tetrahedra, a) & naive.star(mesh.tetrahedra, b)
+        assert set(out[:n].tolist()) == both
+
+
+@pytest.mark.kernel
+def test_node_size_is_the_smallest_altitude_around(mesh, around):
+    body, visits, out = around
+    n_nodes = len(mesh.positions)
+    sizes = [naive.node_size(mesh.positions, mesh.tetrahedra, node) for node in range(n_nodes)]
+    assert [node_size(body, visits, k, out) for k in range(n_nodes)] == pytest.approx(sizes)
+    assert mean_node_size(body, visits, out) == pytest.approx(np.mean(sizes))

@@ -1,10 +1,12 @@
+""""""
+
 import numpy as np
 import pytest
 
 from tests.tissue.geometry_of_meshes import dihedral_angles
-from tissue import block, lattice_block, liver_lobe
+from tissue import block, cylinder, lattice_block, liver_lobe
 from tissue.mesh.faces import boundary_faces, sorted_faces
-from tissue.mesh.validation import checked, signed_volumes
+from tissue.mesh.validation import checked, quality, signed_volumes
 from tissue.shapes.liver_lobe import make_mesh
 
 
@@ -22,26 +24,12 @@ def test_the_six_tetrahedra_of_a_cell_have_equal_positive_volumes(cells):
     assert volumes == pytest.approx(0.1 * 0.2 * 0.3 / (6 * np.prod(cells)), rel=1e-12)
 
 
-def test_the_six_tetrahedra_of_a_cell_share_its_main_diagonal():
-    mesh = block((1, 1, 1), (1.0, 1.0, 1.0))
-    for corner in ([0, 0, 0], [1, 1, 1]):
-        node = np.flatnonzero((mesh.positions == corner).all(axis=1))
-        assert (mesh.tetrahedra == node).any(axis=1).all()
-
-
 @pytest.mark.parametrize("cells", [(1, 1, 1), (3, 1, 2), (2, 3, 4)])
 def test_neighbouring_cells_agree_on_the_diagonal_of_their_face(cells):
     n_x, n_y, n_z = cells
     tetrahedra = block(cells).tetrahedra
     assert sorted_faces(tetrahedra).counts.max() <= 2
     assert len(boundary_faces(tetrahedra)) == 4 * (n_x * n_y + n_y * n_z + n_z * n_x)
-
-
-def test_the_boundary_faces_of_a_grid_are_counter_clockwise_seen_from_outside():
-    mesh = block((2, 3, 1))
-    a, b, c = (mesh.positions[boundary_faces(mesh.tetrahedra)[:, k]] for k in range(3))
-    enclosed = np.einsum("ij,ij->i", np.cross(a, b), c).sum() / 6.0
-    assert enclosed == pytest.approx(signed_volumes(*mesh).sum(), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -121,11 +109,6 @@ def test_cells_of_a_lattice_block_agree_on_their_faces(cells):
     assert len(tetrahedra) == 12 * n_x * n_y * n_z  # six sides with two, or half of four
 
 
-def test_a_node_is_in_the_middle_of_each_cell():
-    mesh = lattice_block((2, 1, 1), (2.0, 1.0, 1.0))
-    assert mesh.positions[-2:].tolist() == [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]]
-
-
 def test_angles_of_a_lattice_are_60_and_90_degrees_inside_and_45_to_120_at_the_surface():
     mesh = lattice_block((3, 3, 3), (1.0, 1.0, 1.0))
     angles = dihedral_angles(mesh)
@@ -133,17 +116,6 @@ def test_angles_of_a_lattice_are_60_and_90_degrees_inside_and_45_to_120_at_the_s
     is_inside = (mesh.tetrahedra >= 4**3).sum(axis=1) == 2  # between the centres of two cells
     inside = np.unique(np.round(angles[:, is_inside], 9))
     assert inside == pytest.approx([60.0, 90.0])
-
-
-def test_a_lattice_block_has_no_preferred_direction():
-    """Diagonals of the surface lie both ways on each side."""
-    mesh = lattice_block((2, 2, 2), (1.0, 1.0, 1.0))
-    for axis in range(3):
-        faces = mesh.positions[boundary_faces(mesh.tetrahedra)]
-        on_side = faces[(faces[:, :, axis] == 1.0).all(axis=1)]
-        edges = np.roll(on_side, 1, axis=1) - on_side
-        others = np.delete(edges, axis, axis=2).prod(axis=2)
-        assert np.unique(np.sign(others), return_counts=True)[1].tolist() == [4, 16, 4]
 
 
 @pytest.mark.parametrize(
@@ -157,3 +129,43 @@ def test_a_lattice_block_has_no_preferred_direction():
 def test_an_impossible_lattice_is_refused_with_the_reason(arguments, message):
     with pytest.raises(ValueError, match=message):
         lattice_block(**arguments)
+
+
+@pytest.mark.parametrize("cells", [(1, 1), (2, 3), (5, 8), (8, 4)])
+def test_its_volume_is_that_of_the_circle_times_the_height(cells):
+    mesh = cylinder(cells, 0.015, 0.04)
+    volumes = signed_volumes(*mesh)
+    assert volumes.min() > 0.0
+    assert volumes.sum() == pytest.approx(np.pi * 0.015**2 * 0.04, rel=1e-12)
+    assert len(mesh.tetrahedra) == 3 * 6 * cells[0] ** 2 * cells[1]
+
+
+def test_its_elements_have_no_bad_shape():
+    mesh = cylinder((5, 17), 0.015, 0.05)
+    assert quality(*mesh).min() > 0.3
+
+
+def test_the_ends_are_flat_and_the_side_is_on_a_circle():
+    mesh = cylinder((3, 4), 0.01, 0.02)
+    x = mesh.positions
+    assert set(np.round(x[:, 2], 9)) == {0.0, 0.005, 0.01, 0.015, 0.02}
+    radius = np.hypot(x[:, 0], x[:, 1])
+    outer = np.sort(radius)[-5 * 18 :]
+    np.testing.assert_allclose(outer, outer[0], rtol=1e-12)
+    assert outer[0] == pytest.approx(0.01, rel=0.011)  # a little more: the area is exact
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ({"cells": (0, 4)}, "whole numbers of at least 1"),
+        ({"cells": (2.5, 4)}, "whole numbers of at least 1"),
+        ({"cells": (2, 4, 4)}, "whole numbers of at least 1"),
+        ({"cells": (10_000, 10_000)}, "prisms; take fewer"),
+        ({"radius": 0.0}, "radius is 0.0 m"),
+        ({"height": float("nan")}, "height is nan m"),
+    ],
+)
+def test_measures_that_make_no_body_are_refused(arguments, expected):
+    with pytest.raises(ValueError, match=expected):
+        cylinder(**arguments)

@@ -51,36 +51,6 @@ class Strip:
         return np.flatnonzero(self.motion.self_proximity)
 
 
-def test_a_flat_strip_is_not_near_itself():
-    strip = Strip()
-    assert not strip.search()
-    assert len(strip.marked) == 0
-
-
-def test_a_strip_squeezed_to_half_its_length_is_not_near_itself():
-    strip = Strip()
-    strip.search()
-    strip.body.positions[:, 0] *= 0.5
-    assert not strip.search()
-
-
-def test_a_strip_that_is_bent_over_is_near_itself_but_where_it_bends():
-    strip = Strip()
-    strip.search()
-    strip.bend(0.5 * SIZE)
-    assert strip.search()
-    from_bend = np.abs(strip.body.rest[:, 0] - 0.5 * N * SIZE)
-    assert set(np.flatnonzero(from_bend > 0.5 * APART * SIZE + SIZE)) <= set(strip.marked)
-    assert from_bend[strip.marked].min() > (0.5 * APART - NEAR) * SIZE
-
-
-def test_halves_that_are_farther_apart_than_near_are_not_near():
-    strip = Strip()
-    strip.search()
-    strip.bend((NEAR + 0.1) * SIZE)
-    assert not strip.search()
-
-
 def test_skin_that_moves_apart_again_is_not_near_itself():
     strip = Strip()
     strip.bend(0.5 * SIZE)
@@ -141,29 +111,6 @@ def notched(gap: int, lean: float = 0.0) -> Strip:
     side = np.sign(positions[:, 0] - (0.5 * gap + 2.0) * SIZE)
     positions[:, 0] += side * above * np.tan(lean)
     return Strip(TetrahedralMesh(positions, kept.reshape(-1, 4)))
-
-
-@pytest.mark.parametrize("gap", [1, 2])
-@pytest.mark.parametrize("degrees", [0.0, 20.0])
-def test_the_walls_of_a_notch_are_marked_however_near_they_are_and_no_other_skin(gap, degrees):
-    strip = notched(gap, np.radians(degrees))
-    assert strip.search()
-    x, _, z = strip.body.rest[strip.marked].T / SIZE
-    above = (z - 2.0) * np.tan(np.radians(degrees))
-    assert np.abs(np.abs(x - 0.5 * gap - 2.0) - 0.5 * gap - above).max() < 1e-9
-    assert (z > 1.5).all()
-    assert (strip.motion.self_proximity[strip.marked] == NOTCH).all()
-
-
-def test_the_walls_of_a_wedge_of_more_than_60_degrees_are_not_marked():
-    assert not notched(1, np.radians(35.0)).search()
-
-
-def test_walls_that_are_farther_apart_than_near_are_not_marked_until_they_are_near():
-    strip = notched(4)
-    assert not strip.search()
-    strip.body.positions[:, 0] *= 0.7
-    assert strip.search()
 
 
 def marks_by_definition(strip: Strip) -> np.ndarray:

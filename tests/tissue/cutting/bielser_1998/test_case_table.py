@@ -1,7 +1,9 @@
-"""The lookup table: 37 oriented subcases of the five cases, rotated and mirrored."""
+"""The generic 1:17 split, and the lookup table: 37 oriented subcases of the five cases."""
 
+import itertools
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from tissue.cutting.bielser_1998.case_table import (
@@ -19,8 +21,10 @@ from tissue.cutting.bielser_1998.template_1_to_17 import (
     FACE_NODE,
     FACES,
     N_CHILDREN,
+    N_LOCAL_NODES,
     PRESPLIT,
     code_of,
+    generic_weights,
     is_edge_cut,
 )
 
@@ -151,3 +155,30 @@ def test_the_bits_are_in_the_order_of_the_paper():
     names = ["".join(CORNERS[i] for i in ends) for ends in EDGES]
     assert names == ["AB", "BC", "BD", "AC", "CD", "AD"]
     assert [code_of(name) for name in names] == [32, 16, 8, 4, 2, 1]
+
+
+VOLUMES = np.linalg.det(generic_weights()[PRESPLIT.children])
+"""Volumes of the children, as shares of that of the tetrahedron."""
+
+
+def test_the_template_has_17_tetrahedra_of_14_nodes():
+    assert PRESPLIT.children.shape == (17, 4)
+    assert set(PRESPLIT.children.ravel()) == set(range(N_LOCAL_NODES)) == set(range(14))
+
+
+def test_cores_are_2_27ths_parts_along_edges_an_18th_and_the_centre_a_27th():
+    assert Counter(VOLUMES.round(12)) == {
+        round(2 / 27, 12): 4,
+        round(1 / 18, 12): 12,
+        round(1 / 27, 12): 1,
+    }
+    assert VOLUMES.sum() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_inner_links_are_symmetric_and_share_a_triangle():
+    for c, f in itertools.product(range(N_CHILDREN), range(4)):
+        if PRESPLIT.inner[c, f] >= 0:
+            other, g = divmod(int(PRESPLIT.inner[c, f]), 4)
+            assert PRESPLIT.inner[other, g] == 4 * c + f
+            mine = set(np.delete(PRESPLIT.children[c], f))
+            assert mine == set(np.delete(PRESPLIT.children[other], g))

@@ -126,13 +126,6 @@ def test_the_centre_of_a_planar_cut_is_not_flat():
     assert seen == {3, 4}
 
 
-def test_random_nodes_invert_only_the_centre_in_8_percent_of_cases():
-    random = np.random.default_rng(1)
-    v = np.array([volumes(random_weights(random)) for _ in range(4000)])
-    assert np.delete(v, CENTRE_CHILD, axis=1).min() > 0.0
-    assert (v[:, CENTRE_CHILD] <= 0.0).mean() == pytest.approx(0.077, abs=0.01)
-
-
 def test_the_volume_of_the_centre_is_that_of_its_four_nodes():
     table = splits_of(bodies.unit_tetrahedron()).scheme._table
     random = np.random.default_rng(2)

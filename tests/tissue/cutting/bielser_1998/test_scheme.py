@@ -8,7 +8,7 @@ import pytest
 from tests.support import bodies, soundness, strokes
 from tests.support.materials import SPRINGS
 from tests.tissue.kernels_of import row, springs_of
-from tissue import Material, SolverSettings, Tissue, block
+from tissue import SolverSettings, Tissue, block
 
 CELL = 0.01
 NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -216,24 +216,6 @@ def test_springs_and_masses_are_those_of_the_split_mesh():
              for i, a in enumerate(t) for p in [(a, b) for b in t[i + 1 :]]}  # fmt: skip
     assert pairs == {(i, j) for i in range(n) for j in kept[i] if i < j}
     assert all(kept[j][i] == spring for i in range(n) for j, spring in kept[i].items())
-
-
-def test_the_work_of_cutting_is_toughness_times_the_area_cut():
-    mesh = block((4, 6, 4))
-    tissue = uncut(mesh, material=Material(toughness=20.0), fixed=bodies.sides(mesh))
-    last = strokes.make(tissue, strokes.straight(mesh, 0.41))[-1]
-    assert tissue.n_pieces() == 2
-    assert last.work_of_cutting == pytest.approx(20.0 * last.cut_area, rel=0.1)
-
-
-def test_the_same_stroke_gives_the_same_bits():
-    def run():
-        tissue = uncut(bodies.jittered(3, 1), fixed=bodies.sides(bodies.jittered(3, 1)))
-        strokes.make(tissue, strokes.upright(0.017, -0.01, 0.03, 0.012, 0.06))
-        after = tissue.snapshot()
-        return [array.tobytes() for array in after]
-
-    assert run() == run()
 
 
 def test_a_cut_that_exceeds_the_capacity_takes_several_passes():

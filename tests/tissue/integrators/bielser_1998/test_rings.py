@@ -29,10 +29,6 @@ def network():
     return block(3, held=False)
 
 
-def test_the_network_has_four_nodes_along_each_side():
-    assert len(network().body.rest) == N_NODES
-
-
 def edges_apart(start: int) -> list[int]:
     """Return the distance of every node from `start` in edges, by matrix powers."""
     springs = network().springs
@@ -137,13 +133,6 @@ def test_neighbours_of_distant_anchored_nodes_are_in_the_last_ring():
     first = springs.first[far]
     neighbours = springs.neighbour[first : first + springs.count[far]].tolist()
     assert {ring_of(rings, node) for node in neighbours} == {0, 2}
-
-
-def test_the_order_is_ring_by_ring_and_each_node_once():
-    rings = rings_of(held_by(TIP, 30, HEEL), 3)
-    order = found_nodes(rings)
-    assert len(set(order)) == len(order)
-    assert (np.diff(rings.ring[order]) >= 0).all()
 
 
 def test_the_focus_stays_when_no_anchor_is_left():
