@@ -3,11 +3,13 @@
 import os
 import re
 import runpy
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 FOLDER = Path(__file__).parents[1] / "docs" / "examples"
@@ -118,3 +120,57 @@ def test_a_robot_of_your_own_is_the_left_hand_and_carries_what_is_cut_off(run):
     assert float(weight) == pytest.approx(1e-3 * float(grams) * 9.81, rel=0.1)  # it swings
     code = (FOLDER / "own_grasper.py").read_text(encoding="utf-8").splitlines()
     assert sum(bool(line) and not line.startswith(('"""', "import", "from")) for line in code) < 15
+
+
+def edits_of(page: str) -> list[tuple[str, str, str]]:
+    """Return each edit that the `diff` blocks of a page show: file, text before, text after."""
+    found = []
+    for path, body in re.findall(r"^```diff\n--- (\S+)\n(.*?)^```", page, re.DOTALL | re.MULTILINE):
+        for hunk in re.split(r"^@@\n", body, flags=re.MULTILINE):
+            lines = hunk.splitlines(keepends=True)
+            before = "".join(line[1:] for line in lines if not line.startswith("+"))
+            after = "".join(line[1:] for line in lines if not line.startswith("-"))
+            found.append((path, before, after))
+    return found
+
+
+SAGS = """
+from tissue import Material, SolverSettings, Tissue, block, fixed_nodes
+
+mesh = block((1, 1, 1), (0.01, 0.01, 0.01))
+material = Material(10e3, law="neo_hookean", viscous_damping=0.0, retardation_time=0.0)
+for relaxation in ("verlet", "symplectic_euler"):
+    solver = SolverSettings(relaxation=relaxation)
+    tissue = Tissue(mesh, material, fixed=fixed_nodes(mesh, "bottom"), solver=solver)
+    top = tissue.material_points("top")
+    for _ in range(20):
+        tissue.step(None, 1e-3)
+        print(1e6 * (0.01 - tissue.positions_of(top)[:, 2].mean()))
+"""
+"""The height that a block loses in each millisecond after its weight begins to act [um]."""
+
+
+def test_a_method_is_added_by_the_edits_that_are_shown(tmp_path):
+    """A copy of the package with them swings a block, without the compiler, nearly as verlet."""
+    root = FOLDER.parents[1]
+    page = (root / "docs" / "extend.md").read_text(encoding="utf-8")
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(root / "tissue", tmp_path / "tissue", ignore=ignored)
+    code = re.search(r"^```py\n(.*?)^```", page, re.DOTALL | re.MULTILINE).group(1)
+    path = re.search(r"Its new file is `([\w/.]+)`", page).group(1)
+    (tmp_path / path).write_text(code, encoding="utf-8")
+    for name, before, after in edits_of(page):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert text.count(before) == 1, f"{name} does not have once:\n{before}"
+        (tmp_path / name).write_text(text.replace(before, after), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", SAGS],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+        env=os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"},
+    )
+    verlet, euler = np.array(done.stdout.split(), dtype=float).reshape(2, 20)
+    assert 0.01 < np.abs(euler - verlet).max() / verlet.max() < 0.1  # it is of first order
