@@ -157,7 +157,7 @@ def test_a_method_is_added_by_the_edits_that_are_shown(tmp_path):
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(root / "tissue", tmp_path / "tissue", ignore=ignored)
     code = re.search(r"^```py\n(.*?)^```", page, re.DOTALL | re.MULTILINE).group(1)
-    path = re.search(r"Its new file is `([\w/.]+)`", page).group(1)
+    path = re.search(r"Its new file is \*([\w/.]+)\*", page).group(1)
     (tmp_path / path).write_text(code, encoding="utf-8")
     for name, before, after in edits_of(page):
         text = (tmp_path / name).read_text(encoding="utf-8")

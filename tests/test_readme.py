@@ -10,10 +10,11 @@ import pytest
 from cyclopts import App
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
+from bridge.tcp.wire import PROTOCOL_VERSION
 from scalpel_sim import COLUMNS, OBSERVATIONS, STROKES
 from scalpel_sim.cli.app import app, command_line
 from scalpel_sim.runs.file_names import RUN_FILES
-from tissue import LAWS
+from tissue import LAWS, MATERIALS
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -185,3 +186,22 @@ def test_the_package_offers_the_two_commands_of_the_readme():
     assert "\npip install uv && uv run --extra test pytest\n" in text
     assert "scalpel-sim" in project["scripts"]
     assert any(name.startswith("pytest") for name in project["optional-dependencies"]["test"])
+
+
+def test_the_readme_counts_laws_and_materials_as_the_code_does():
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+    text = README.read_text(encoding="utf-8")
+    stiffening = sum(law.stiffens for law in LAWS.values())
+    assert f"**{words[len(LAWS)].title()} laws**" in text
+    assert f"{words[stiffening]} that stiffen, with {words[len(MATERIALS)]} materials" in text
+
+
+def test_the_page_of_the_protocol_has_its_version():
+    text = (ROOT / "docs" / "wire.md").read_text(encoding="utf-8")
+    assert f"version, {PROTOCOL_VERSION};" in text
+
+
+def test_the_page_of_the_strokes_lists_all_that_an_option_names():
+    text = (ROOT / "docs" / "cutting.md").read_text(encoding="utf-8")
+    planned = [name for name, kind in STROKES.items() if kind.is_planned]
+    assert planned and [name for name in planned if f"`{name}`" not in text] == []
