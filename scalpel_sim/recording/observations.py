@@ -137,7 +137,7 @@ def observed(
         names: Names of quantities and observations.
 
     Raises:
-        UsageError: there is none of that name.
+        UsageError: there is none of that name, or one returns something other than arrays.
     """
     wanted, found = {name: name.partition(":") for name in names}, dict[str, np.ndarray]()
     for group in groups:
@@ -152,11 +152,26 @@ def observed(
         if name in found:
             there[name] = found[name]
         elif kind in OBSERVATIONS:
-            there |= OBSERVATIONS[kind](simulation, argument)
+            there |= _arrays_of(kind, OBSERVATIONS[kind](simulation, argument))
         else:
             known = [*(each for group in groups for each in group.quantities), *OBSERVATIONS]
             raise unknown("observation", name, known)
     return there
+
+
+def _arrays_of(kind: str, values: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+    """Return what an observation returned.
+
+    Raises:
+        UsageError: a value is not an array.
+    """
+    for name, value in values.items():
+        if not isinstance(value, np.ndarray):
+            raise UsageError(
+                f"observation {kind!r} returned a {type(value).__name__} as {name!r}; it must be "
+                "an array of NumPy, also for a single number"
+            )
+    return values
 
 
 def result_at_rest(link: TissueLink) -> StepResult:
