@@ -85,7 +85,9 @@ def begin_frame(
         around = frame.relaxation.choice.surroundings
         if not surely_takes_few_steps(step.elastic, around, squared, dt):
             return MANY_STEPS
-    if after < TOO_FAR and not _divides_travel(frame, edge, has_blade):
+    # In each call: what was settled may have made another struct.
+    is_near = _divide_travel(frame, edge, has_blade)
+    if after < TOO_FAR and not is_near:
         return TOO_FAR
     length = norm(sub(edge.tip_t1, edge.heel_t1)) if has_blade else 0.0
     if after < OTHER_EDGE and is_other_length(length, edge_length):
@@ -105,10 +107,13 @@ def begin_frame(
 
 
 @kernel
-def _divides_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
-    """Write into how many increments the travel of the edge divides the step; False: too many.
+def _divide_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
+    """Write into how many increments the travel of the edge divides the step.
 
     It is 1 for a path that is not finite: a blade on it is refused.
+
+    Returns:
+        Whether they are at most `MOST_EDGE_INCREMENTS`.
     """
     frame.n_increments, frame.travel = 1, 0.0
     if has_blade:
@@ -117,7 +122,5 @@ def _divides_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
     n = frame.travel / (INCREMENT * frame.node_size)
     if not math.isfinite(n):
         return True
-    if n > MOST_EDGE_INCREMENTS:
-        return False
-    frame.n_increments = max(1, math.ceil(n))
-    return True
+    frame.n_increments = max(1, min(math.ceil(n), MOST_EDGE_INCREMENTS))
+    return bool(n <= MOST_EDGE_INCREMENTS)

@@ -38,7 +38,7 @@ def result_of(rng, n):
     )
     half = rng.normal(size=(6, 6))
     return SimpleNamespace(
-        contacts=contacts,
+        contacts_of_blade=contacts,
         stiffness=half @ half.T,
         cut_area=1.0,
         finished_area=2.0,
@@ -66,7 +66,7 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
     assert len(row) == len(shared_columns())
     assert row[:4] == [0.5, *blade.tip]
     assert row[4:16] == [*felt.force, *felt.torque, *raw.force, *raw.torque]
-    parts = force_parts(result.contacts, there.vectors_to_tissue(blade.forward))
+    parts = force_parts(result.contacts_of_blade, there.vectors_to_tissue(blade.forward))
     assert row[16:25] == there.vectors_to_world(np.array(parts)).ravel().tolist()
     stiffness = there.matrix_to_world(result.stiffness[:3, :3])
     assert row[25:31] == [stiffness[at] for at in AXES]

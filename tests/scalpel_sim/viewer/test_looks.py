@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
@@ -38,7 +39,7 @@ def shared_tab(browser, tmp_path_factory):
     replay = ReplayWriter(model, title="block: a <cut>", frame=FRAME)
     for time, surface, stress in ((0.0, cut_tissue()[0], 700.0), (1.25, cut_tissue()[2], 300.0)):
         values = {"stress": np.full(len(surface.positions), stress)}
-        replay.add(time, surface, body_poses(data), readings(time), values)
+        replay.add(time, SceneState(surface, body_poses(data), readings(time), None, values))
     replay.write(path)
     tab = new_tab(browser)
     tab.goto(local_file(path))
