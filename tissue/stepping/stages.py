@@ -122,15 +122,16 @@ class StepStages:
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
         model, incision, handles = self.model, self.incision, self.handles
-        begun = self._begin(sweep, edge, dt)
-        n, travel = begun.n_increments * self.global_stepper.refinement, begun.travel
+        frame = self._begin(sweep, edge, dt)
+        n, travel = frame.n_increments * self.global_stepper.refinement, frame.travel
         n_substeps = 0
         collision = topology = relaxation = 0.0  # wall times
         now = perf_counter()
         for i in range(n):
             increment, started = Increment(edge, dt, i / n, (i + 1) / n), now
             # RX, relaxation: forces, contact, motion, slip of the blade
-            n_substeps += self._relax(increment, has_blade)
+            frame = frame if i == 0 else self._frame_now()
+            n_substeps += self._relax(frame, increment, has_blade)
             relaxed = perf_counter()
             # CD, collision detection: path, active tetrahedra, crossed edges
             is_crossed = has_blade and self._detect(increment)
@@ -192,7 +193,7 @@ class StepStages:
             if outcome == OTHER_EDGE:
                 self.take_edge(edge)
 
-    def _relax(self, increment: Increment, has_blade: bool) -> int:
+    def _relax(self, frame: FrameContext, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
         model, handles, audit = self.model, self.handles, self.audit
         before, is_driven = 0.0, handles.act
@@ -200,8 +201,8 @@ class StepStages:
             if handles.loads.act or handles.attachments.act:
                 self.global_stepper.wake()
             before = handles.begin_increment(increment, has_blade)
-        arrays = self._frame_now().relaxation
-        n = self.integrator.relax(model, arrays, increment, has_blade)
+            frame = self._frame_now()
+        n = self.integrator.relax(model, frame.relaxation, increment, has_blade)
         geoms = model.geoms.arrays
         of_loads = handles.end_increment(before, increment) if is_driven else 0.0
         audit.work_of_loads += of_loads + geoms.work
