@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, Protocol, Self
 
 import mujoco
 import numpy as np
@@ -76,15 +76,6 @@ class SavedSimulation(Protocol):
         """Graspers of other arms."""
 
 
-class _Elsewhere(NamedTuple):
-    """A state from bytes, which another process may have saved."""
-
-    settings: dict[str, str]
-    """Settings of the simulation that was saved: see `_settings_of`."""
-    wall_seconds: float
-    """Wall time of its frames so far [s]."""
-
-
 class SimulationState:
     """A simulation at the end of a frame.
 
@@ -93,14 +84,16 @@ class SimulationState:
 
     def __init__(
         self,
-        source: Memento | _Elsewhere,
+        source: Memento | dict[str, str],
         arm: FloatArray,
         places: FloatArray,
         tissue: TissueState,
         n_frames: int,
+        wall_seconds: float,
     ) -> None:
         self._source, self._arm, self._tissue = source, arm, tissue
-        self._places = places
+        """Source: the simulation that was saved, or, from bytes, the settings of another one."""
+        self._places, self._wall_seconds = places, wall_seconds
         self.n_frames = n_frames
         """Number of frames that were done."""
 
@@ -121,7 +114,7 @@ class SimulationState:
         mujoco.mj_getState(model, data, arm, _SPEC)
         tissue, memento = link.tissue.save_state(), Memento(simulation, _RULES)
         places = np.concatenate([getattr(data, name).ravel() for name in _PLACES])
-        return cls(memento, arm, places, tissue, simulation.n_frames)
+        return cls(memento, arm, places, tissue, simulation.n_frames, simulation.wall_seconds)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
@@ -132,9 +125,9 @@ class SimulationState:
         """
         tissue = TissueState.from_bytes(data)
         content = json.loads(tissue.beside(_CONTENT).tobytes())
-        source = _Elsewhere(content["settings"], content["wall_seconds"])
         arm, places = tissue.beside(_ARM), tissue.beside(_WHERE)
-        return cls(source, arm, places, tissue, content["n_frames"])
+        numbers = content["n_frames"], content["wall_seconds"]
+        return cls(content["settings"], arm, places, tissue, *numbers)
 
     def to_bytes(self) -> bytes:
         """Return the state as bytes: a NumPy archive (`.npz`) of plain arrays and of JSON.
@@ -150,7 +143,7 @@ class SimulationState:
         simulation = self._source.root
         content = {
             "settings": _settings_of(simulation),
-            "wall_seconds": simulation.wall_seconds,
+            "wall_seconds": self._wall_seconds,
             "n_frames": self.n_frames,
         }
         text = np.frombuffer(json.dumps(content, allow_nan=False).encode(), np.uint8)
@@ -187,9 +180,9 @@ class SimulationState:
                     "run without --connect"
                 )
             link.tissue.expect_state(self._tissue)
-            _expect_compatible(simulation, source.settings)
+            _expect_compatible(simulation, source)
             link.tissue.load_state(self._tissue, Around(simulation, _RULES))
-            simulation.wall_seconds = source.wall_seconds
+            simulation.wall_seconds = self._wall_seconds
         mujoco.mj_setState(model, data, self._arm, _SPEC)
         mujoco.mj_forward(model, data)  # for whoever looks at the arm before the next frame
         mujoco.mj_setState(model, data, self._arm, _SPEC)  # it has moved its solver on

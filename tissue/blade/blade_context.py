@@ -189,6 +189,8 @@ class LazyResult(StepResult):
 
     report: BladeReport
     geoms: GeomContact | None
+    has_views = True
+    """Contacts are views of the report of the blade."""
     contacts_of_blade = property(attrgetter("report.contacts"))
 
     @classmethod

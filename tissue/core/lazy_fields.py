@@ -53,6 +53,11 @@ def lazy_fields(**makers: Callable[[Any], Any]) -> Callable[[_C], _C]:
     return decorate
 
 
+def keeps_views(value: tuple[Any, ...]) -> bool:
+    """Return whether fields of a tuple are views of memory that the next step changes."""
+    return bool(getattr(value, "has_views", False))
+
+
 def plain_class(kind: type) -> type:
     """Return the named tuple of which a class makes fields when they are asked for, or itself."""
     is_lazy = any(isinstance(each, _LazyField) for each in vars(kind).values())

@@ -16,6 +16,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.attributes import attributes_of, set_attributes
+from tissue.core.lazy_fields import keeps_views
 from tissue.core.memory_blocks import (
     PackedMemory,
     StructMemory,
@@ -149,7 +150,8 @@ class Memento:
             return
         self._seen.add(id(value))
         if order == _TUPLE:
-            for item in tuple.__iter__(value):
+            # What a tuple makes of memory that changes is made now, and what is in it is kept.
+            for item in value if keeps_views(value) else tuple.__iter__(value):
                 self._walk(item)
         elif order == _STRUCT:
             self.structs.append(value)
