@@ -63,6 +63,18 @@ def test_what_is_no_longer_found_lets_go_little_by_little():
     assert tissue._model.contact.forces.n_contacts == 0
 
 
+def test_what_is_found_again_goes_on_with_the_force_that_fades():
+    tissue = pressed_blocks()
+    for _ in range(500):
+        before = tissue.step(None, strokes.DT).body_contacts.force
+    for by in (ELEMENT, -ELEMENT):
+        lift(tissue, by)
+        result = tissue.step(None, strokes.DT)
+    assert result.body_contacts.force > 0.4 * before
+    assert tissue.step(None, strokes.DT).body_contacts.force > 0.4 * before
+    assert tissue._model.contact.forces.n_fading == 0
+
+
 def advance(tissue: Tissue, duration: float, every: int = 50) -> float:
     """Advance the body; return the deepest overlap, tested in every `every`-th frame [m]."""
     worst = 0.0
@@ -158,6 +170,17 @@ def test_lips_that_lie_node_on_node_press_as_much_as_those_that_are_shifted():
     assert pushed[1].force == pytest.approx(pushed[0].force, rel=0.05)
 
 
+def test_a_piece_that_is_cut_off_lands_on_the_floor():
+    mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
+    tissue = Tissue(mesh, fixed=mesh.positions[:, 0] <= 0.02, floor=-0.005)
+    strokes.make(tissue, strokes.straight(mesh, 0.75))
+    for _ in range(600):
+        result = tissue.step(None, strokes.DT)
+    loose = next(piece for piece in tissue.pieces() if not piece.is_held)
+    assert result.body_contacts.force_of_floor[2] == pytest.approx(loose.mass * 9.81, rel=0.1)
+    assert np.linalg.norm(loose.velocity) < AT_REST
+
+
 def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
     def run() -> Tissue:
         tissue = split_block()
@@ -170,6 +193,19 @@ def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
     monkeypatch.setattr("tissue.contact.self_contact.CAPACITY_OF_PAIRS", 4)
     for one, other in zip(ample.snapshot(), run().snapshot(), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_lips_that_lie_inside_each_other_come_out():
+    """Lips touch at rest; both were moved by 1 mm before any contact was known."""
+    tissue = split_block()
+    body, n = tissue._body, tissue.n_nodes
+    tetrahedra = body.tetrahedra[: tissue.n_tetrahedra]
+    is_left = body.rest[tetrahedra].mean(axis=1)[:, 0] < 0.0207
+    body.positions[:n, 0] += np.where(np.isin(np.arange(n), tetrahedra[is_left]), 1e-3, -1e-3)
+    before = overlap_depth(tissue.snapshot())
+    assert before > 0.15 * ELEMENT
+    advance(tissue, 0.5, every=500)
+    assert overlap_depth(tissue.snapshot()) < 0.2 * before
 
 
 def test_what_is_found_inside_another_part_comes_out():
@@ -278,6 +314,29 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     last = tissue.step(None, strokes.DT)
     assert last.body_contacts.force == pytest.approx(1.0, rel=0.2)
     assert speed(tissue) < AT_REST
+
+
+def test_crossed_beams_touch_edge_on_edge():
+    """Beams that stand on an edge each: no node comes near a face of the other."""
+    beam = block((6, 1, 1), (0.06, 0.01, 0.01))
+    x, y, z = (beam.positions - [0.03, 0.005, 0.005]).T
+    on_edge = np.stack([x, np.sqrt(0.5) * (y - z), np.sqrt(0.5) * (y + z)], axis=1)
+    upper = beam._replace(positions=on_edge[:, [1, 0, 2]] * [1.0, -1.0, 1.0])
+    mesh = joined(beam._replace(positions=on_edge), upper, (0.005, 0.005, 0.0145))
+    is_lower = np.arange(len(mesh.positions)) < len(on_edge)
+    material = Material(viscous_damping=20.0)
+    tissue = Tissue(mesh, material, fixed=is_lower, gravity=(0.0, 0.0, -2.0))
+    low, ridge = mesh.positions[~is_lower, 2].min(), mesh.positions[is_lower, 2].max()
+    at_edge = ~is_lower & (mesh.positions[:, 2] < low + 1e-9) & (abs(mesh.positions[:, 1]) < 0.006)
+    assert at_edge.sum() == 2 and low > ridge
+    most_contacts = 0
+    for _ in range(300):
+        contacts = tissue.step(None, strokes.DT).body_contacts
+        most_contacts = max(most_contacts, contacts.n_contacts)
+        # The edge between the two nodes crosses the ridge of the lower beam, which is at y = 0.
+        (_, y0, z0), (_, y1, z1) = tissue.snapshot().positions[at_edge]
+        assert z0 - y0 * (z1 - z0) / (y1 - y0) > ridge - ALLOWED
+    assert most_contacts > 0
 
 
 @pytest.mark.parametrize("floor", [np.nan, np.inf, 0.011])

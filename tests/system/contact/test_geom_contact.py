@@ -145,6 +145,25 @@ def edge_at(y):
     return BladeSegment(*ends, np.array([0.0, 1.0, 0.0]))
 
 
+def test_the_work_of_a_drop_is_accounted_for():
+    tissue = brick()
+    tissue.collide_with([TABLE], [[0.0, 0.0, -0.005]])
+    for _ in range(1500):
+        energies = tissue.step(None, 2e-4).energies
+    assert abs(energies.residual) < 0.005 * -energies.potential
+    assert energies.contact > 0.0
+
+
+def test_the_work_of_a_squeeze_is_accounted_for():
+    tissue = brick(gravity=(0.0, 0.0, 0.0), fixed="bottom")
+    press = tissue.collide_with([Geom("press", "plane", friction=0.3)], [[0, 0, 0.0201]], [TURNED])
+    for k in range(200):
+        press.move([[0.0, 0.0, 0.0201 - 2e-5 * min(k, 100)]])
+        energies = tissue.step(None, DT).energies
+    assert energies.work_of_loads > 1e-4
+    assert abs(energies.residual) < 0.005 * energies.work_of_loads
+
+
 @pytest.mark.parametrize(
     ("relaxation", "friction", "share"),
     [("global", 0.0, 0.005), ("global", 0.6, 0.005), ("verlet", 0.6, 0.01)],
@@ -227,6 +246,17 @@ def test_a_rod_of_one_millimetre_does_not_pass_at_half_a_metre_a_second(angle, s
     along = np.linspace(-0.014, 0.014, 29)[:, None] * lying[:, 2]
     assert not any(is_covered(tissue.surface(), p) for p in x - [0.0, 0.0, down] + along)
     assert rod.wrench(0).force[2] > 1.0
+
+
+def test_a_ball_between_the_nodes_of_a_face_is_felt():
+    """The nearest node is 5 mm from the middle of a ball of 2 mm."""
+    mesh = block((3, 3, 2), (0.03, 0.03, 0.02))
+    tissue = Tissue(mesh, GEL, fixed=fixed_nodes(mesh, "bottom"), gravity=(0.0, 0.0, 0.0))
+    ball = tissue.collide_with([Geom("ball", "sphere", (0.002,))], [[0.0135, 0.0165, 0.022]])
+    for k in range(100):
+        ball.move([[0.0135, 0.0165, 0.022 - 1e-5 * (k + 1)]])
+        tissue.step(None, DT)
+    assert ball.wrench(0).force[2] > 0.1
 
 
 def test_a_cut_piece_lands_on_the_table():

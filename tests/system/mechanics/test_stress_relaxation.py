@@ -1,13 +1,23 @@
 """The stress of held tissue relaxes: whole bodies, against Fung's law."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.support import bodies, strokes
 from tests.tissue.solids import evaluate
-from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import (
+    MATERIALS,
+    Material,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+    fixed_nodes,
+    liver_lobe,
+)
 from tissue.blade.edge import NOWHERE
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -119,6 +129,20 @@ def test_a_body_that_settles_has_relaxed_wholly():
     assert np.abs(tissue.snapshot().positions - settled).max() < 1e-3 * sag
 
 
+def test_a_body_that_hangs_creeps_until_it_sags_by_its_last_stiffness():
+    """Creep has the time constant tau / (1 - g)."""
+    mesh = block((3, 3, 3), (0.03, 0.03, 0.03))
+    fast = Material(law="neo_hookean", poisson_ratio=0.45, prony=((0.5, 0.05),))
+    damped = replace(fast, viscous_damping=50.0)
+    creeping, settled = (Tissue(mesh, m, fixed=fixed_nodes(mesh, "top")) for m in (damped, fast))
+    settled.settle()
+    for _ in range(1000):
+        creeping.step(None, 1e-3)
+    x = settled.snapshot().positions
+    sag = np.abs(x - mesh.positions).max()
+    assert np.abs(creeping.snapshot().positions - x).max() < 2e-3 * sag
+
+
 @pytest.mark.parametrize("scheme", ["stellar", "paper"])
 def test_a_cut_leaves_the_stress_that_has_relaxed(scheme):
     """All tetrahedra of a body that is held in one strain have the same; so do all their parts."""
@@ -158,6 +182,40 @@ def test_the_account_of_a_stroke_closes(precision, law):
     last = results[-1].energies
     assert results[-1].cut_area > 1e-3
     assert abs(last.residual) < 5e-3 * last.work_of_blade
+
+
+def test_the_account_of_a_cut_through_the_organ_closes():
+    mesh = liver_lobe()
+    tissue = Tissue(
+        mesh,
+        replace(MATERIALS["liver"].material, toughness=10.0, prony=PRONY),
+        fixed=bodies.sides(mesh, share=0.1),
+        solver=SolverSettings(audit=True, precision="single", mass_scaling=6000.0),
+    )
+    tissue.settle()
+    result = strokes.make(tissue, strokes.slanted(mesh))[-1]
+    assert result.cut_area > 1.2e-3
+    assert abs(result.energies.residual) < 5e-4 * result.energies.work_of_blade
+
+
+def test_the_account_of_a_body_that_swings_closes():
+    """A block stretched by a tenth and let go, without another damper."""
+    mesh = block((2, 2, 2), (0.04, 0.04, 0.04))
+    tissue = Tissue(
+        mesh,
+        replace(SOFT, prony=((0.3, 0.02), (0.2, 2.0)), viscous_damping=0.0, retardation_time=0.0),
+        positions=mesh.positions * [1.0, 1.0, 1.1],
+        fixed=fixed_nodes(mesh, "bottom"),
+        gravity=NO_GRAVITY,
+        solver=SolverSettings(audit=True),
+    )
+    at_first, before = tissue._stages.audit._at_first[0], 0.0
+    for _ in range(3000):
+        now = tissue.step(None, 1e-4).energies
+        assert now.damping > before
+        before = now.damping
+        assert abs(now.residual) < 1e-5 * at_first
+    assert now.damping > 0.9 * at_first
 
 
 def test_the_account_tells_what_maxwell_elements_dissipate():

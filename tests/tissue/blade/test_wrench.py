@@ -65,6 +65,14 @@ def test_contacts_are_views_without_a_copy(cut):
     assert (result.contacts.geom == -1).all()
 
 
+def test_stiffness_is_symmetric_and_positive(cut):
+    _, result, _ = cut
+    np.testing.assert_array_equal(result.stiffness, result.stiffness.T)
+    values = np.linalg.eigvalsh(result.stiffness)
+    assert values[0] > -1e-9 * values.sum()
+    assert values[-1] > 100.0  # a scalpel in tissue: N/m
+
+
 @pytest.mark.parametrize("blade", [None, BladeShape()])
 @pytest.mark.parametrize("axis", [0, 2])
 def test_stiffness_is_the_derivative_of_the_force_before_the_tissue_moves(blade, axis):

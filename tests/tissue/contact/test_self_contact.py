@@ -1,12 +1,18 @@
 """Contacts of two blocks are those that a test of all pairs finds, and go on as they were."""
 
+import math
+
 import numpy as np
 import pytest
 
 from tests.support.overlaps import joined
 from tissue import block
+from tissue.contact.narrow.node_face import over_faces, points_of_tests
 from tissue.contact.response.contacts import SAME_DIRECTION
 from tissue.contact.self_contact import SelfContact
+from tissue.core.jit import kernel
+from tissue.core.simd import room_for_points, store_lanes
+from tissue.core.vec3 import cross, dot, scale, sub, vec3
 from tissue.mesh.body import build_body
 
 SIZE = 0.01
@@ -64,6 +70,30 @@ def test_each_node_within_reach_over_a_face_has_one_contact_with_weights_of_its_
     is_below = ~is_upper[nodes[:, 0]]  # a node is pushed out of the block that it is not of
     towards = np.where(is_below, -1.0, 1.0) * forces.normal[rows][is_node][:, 2]
     assert (towards > 0.9).all()
+
+
+def measure(x, nodes, out):
+    """Write height and weights of eight nodes over a face each."""
+    over = over_faces(points_of_tests(x, nodes, 0))
+    for k, lanes in enumerate((over.height, over.weights.x, over.weights.y, over.weights.z)):
+        store_lanes(out, 8 * k, lanes)
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("seed", range(3))
+def test_height_and_weights_over_eight_faces_are_to_the_bit_those_of_scalars(seed):
+    random, x, out = np.random.default_rng(seed), room_for_points(20), np.zeros(32)
+    x[:] = random.normal(size=(20, 3))
+    nodes = np.array([random.choice(20, 4, replace=False) for _ in range(8)])
+    kernel(measure)(x, nodes, out)
+    for k, of_test in enumerate(nodes):
+        node, corner, b, c = (vec3(x, i) for i in of_test)
+        ab, ac, ap = sub(b, corner), sub(c, corner), sub(node, corner)
+        area = cross(ab, ac)
+        square = dot(area, area)
+        wb, wc = dot(cross(ap, ac), area) / square, dot(cross(ab, ap), area) / square
+        height = dot(ap, scale(1.0 / math.sqrt(square), area))
+        assert out[k::8].tolist() == [height, 1.0 - wb - wc, wb, wc]
 
 
 @pytest.mark.kernel

@@ -111,6 +111,21 @@ def test_added_mass_changes_no_force_so_that_equilibrium_is_the_same():
     np.testing.assert_allclose(forces(scaled, x), expected, atol=1e-12 * np.abs(expected).max())
 
 
+def test_added_mass_keeps_the_sag_to_a_millionth():
+    """Drag is strong, so that nothing moves any more; the slit stays open."""
+    sags = []
+    for mass_scaling in (0.5 * LOW, None):
+        tissue = body_of(mass_scaling, viscous_damping=60.0)
+        slit = [[(0.0287, y, 0.0123), (0.0287, y, 0.04)] for y in (-0.01, 0.07)]
+        tissue.incise(slit, (0.0, 1.0, 0.0))
+        for _ in range(1000):
+            result = tissue.step(None, 1e-3)
+        assert result.body_contacts.force == 0.0
+        assert (tissue.cut_report().now.added_mass > 0.0) == (mass_scaling is not None)
+        sags.append(tissue.snapshot().positions - tissue.snapshot().rest_positions)
+    assert np.abs(sags[0] - sags[1]).max() < 1e-6 * np.abs(sags[1]).max()
+
+
 @pytest.mark.parametrize("relaxation", ["global", "verlet"])
 def test_a_free_body_gains_the_momentum_of_its_own_weight(relaxation):
     tissue = cut_body(LOW, relaxation=relaxation, is_held=False, **FREE)

@@ -15,6 +15,7 @@ from tests.tissue.solids import (
     solid_of,
 )
 from tissue import TetrahedralMesh, block
+from tissue.core.jit import is_compiling
 
 pytestmark = pytest.mark.kernel
 
@@ -77,17 +78,17 @@ def test_22_inner_nodes_are_in_equilibrium_under_an_affine_map(averaged):
     np.testing.assert_allclose(equilibrium, affine, atol=1e-10)
 
 
-def _equilibrium(solid: SolidBody, x, inner):
+def _equilibrium(solid: SolidBody, x, inner, pull=0.0, n_steps=8):
     """Return the equilibrium of the inner nodes by Newton's method with finite differences."""
     x, places = x.copy(), np.argwhere(np.repeat(inner[:, None], 3, axis=1))
-    for _ in range(8):
+    for _ in range(n_steps):
         stiffness = np.empty((len(places), len(places)))
         for column, (node, axis) in enumerate(places):
             step = np.zeros_like(x)
             step[node, axis] = 1e-6
-            pull = (solid.forces(x + step) - solid.forces(x - step)) / 2e-6
-            stiffness[:, column] = pull[tuple(places.T)]
-        x[tuple(places.T)] -= np.linalg.solve(stiffness, solid.forces(x)[tuple(places.T)])
+            slope = (solid.forces(x + step) - solid.forces(x - step)) / 2e-6
+            stiffness[:, column] = slope[tuple(places.T)]
+        x[tuple(places.T)] -= np.linalg.solve(stiffness, (solid.forces(x) + pull)[tuple(places.T)])
     return x
 
 
@@ -127,3 +128,23 @@ def test_26_splits_without_a_cut_keep_the_energy():
     assert len(finer.tetrahedra) > len(mesh.tetrahedra) + 200
     before = solid_of(mesh, law).energy(x)
     assert solid_of(finer, law).energy(finer_x) == pytest.approx(before, rel=1e-12)
+
+
+@pytest.mark.skipif(not is_compiling(), reason="thousands of forces: compiled only")
+@pytest.mark.parametrize("averaged", [False, True])
+def test_26_a_slab_sags_as_far_after_splits(averaged):
+    """The paper's block between two plates under gravity; splits only make it softer."""
+    mesh = block((4, 6, 4), (1.0, 1.5, 1.0))
+    finer, _ = subdivided(mesh, mesh.positions)
+    before, after = (_sag(which, law_of(0.45, averaged)) for which in (mesh, finer))
+    assert before < after < 1.02 * before
+
+
+def _sag(mesh, law):
+    """Return the sag of the centre of mass of a slab [m]."""
+    held = bodies.sides(mesh)
+    solid = solid_of(mesh, law, held)
+    masses = solid.body.masses[: len(held)]
+    pull = np.outer(masses, [0.0, 0.0, -1.0])
+    x = _equilibrium(solid, mesh.positions, ~held, pull, n_steps=4)
+    return float(masses @ (mesh.positions - x)[:, 2] / masses.sum())

@@ -28,6 +28,16 @@ def test_forces_in_single_precision_are_those_in_double(law):
 
 
 @in_kernels
+def test_forces_in_single_precision_are_zero_at_rest_and_balance_elsewhere():
+    for law in LAWS.values():
+        assert not solid_of(MESH, law).forces(MESH.positions).any()
+        single = solid_of(MESH, law, is_single=True)
+        assert not single.forces(MESH.positions).any()
+        forces = single.forces(moved(MESH))
+        assert np.abs(forces.sum(axis=0)).max() < LARGEST_ERROR * np.abs(forces).max()
+
+
+@in_kernels
 def test_the_energy_in_single_precision_is_that_in_double():
     for law in LAWS.values():
         double, single = solid_of(MESH, law), solid_of(MESH, law, is_single=True)

@@ -1,5 +1,7 @@
 """Order and stability of the time integration, measured on the engine's own steps."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -93,6 +95,24 @@ def test_the_order_is_four_on_an_oscillator(damping):
     errors = [oscillator_error(n, DAMPINGS[damping]) for n in steps]
     assert order(steps, errors) >= 3.9
     assert errors[-1] < 1e-6
+
+
+@pytest.mark.kernel
+def test_both_forms_have_the_errors_of_theory():
+    """Two periods in 640 steps, damped by a tenth: 4.07e-9 by the classical form, of first order,
+    and 1.67e-9 by that of Nystroem, per amplitude."""
+    n, damping = 640, {"viscous_damping": 0.2 * FREQUENCY}
+    exact, unit = exact_state(2.0, damping), 0.3 * np.array([1.0, FREQUENCY])
+    network = oscillator(FREQUENCY, **damping)
+    network.body.positions[1, 0] = 1.3
+    network.advance(2.0 / n, n)
+    state = np.array([network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]])
+    assert np.abs((state - exact) / unit).max() == pytest.approx(1.67e-9, rel=0.05)
+
+    rates = 2.0 / n * np.array([[0.0, 1.0], [-(FREQUENCY**2), -0.2 * FREQUENCY]])
+    step = sum(np.linalg.matrix_power(rates, k) / math.factorial(k) for k in range(5))
+    state = np.linalg.matrix_power(step, n) @ [0.3, 0.0]
+    assert np.abs((state - exact) / unit).max() == pytest.approx(4.07e-9, rel=0.05)
 
 
 MESH = block((3, 2, 2), (0.06, 0.04, 0.04))

@@ -71,6 +71,13 @@ def test_a_thread_that_never_arrives_changes_nothing(monkeypatch, case):
 
 
 @needs_two_cores
+def test_a_thread_that_leaves_after_each_loop_changes_nothing(monkeypatch):
+    expected = digest_of(cut_through(1, "solid"))
+    monkeypatch.setattr(threads, "LONGEST_SPIN", 1)
+    assert digest_of(cut_through(2, "solid")) == expected
+
+
+@needs_two_cores
 def test_two_bodies_have_threads_of_their_own():
     expected = digest_of(cut_through(1, "solid"))
     pair = [Tissue(MESH, SOLID, fixed=bodies.sides(MESH), floor=-0.03, solver=two()) for _ in "ab"]

@@ -333,6 +333,23 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path):
 # ------------------------------------------------------------------ third-party meshes
 
 
+@pytest.mark.skipif(not bodies.FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
+@pytest.mark.parametrize(
+    ("file", "n_nodes", "n_tetrahedra"),
+    [
+        ("sofa_liver.msh", 181, 596),
+        ("sofa_truthcylinder1.msh", 642, 2524),
+        ("bullet_banana.vtk", 725, 2395),
+        ("sofaenv_tissue_volume.msh", 493, 1432),
+    ],
+)
+def test_public_meshes_are_read_and_can_be_held_by_their_sides(file, n_nodes, n_tetrahedra):
+    mesh = read_mesh(os.path.join(str(bodies.FOLDER), file), bodies.FILES[file])
+    assert (len(mesh.positions), len(mesh.tetrahedra)) == (n_nodes, n_tetrahedra)
+    for side in ("left", "right"):
+        assert 3 <= side_nodes(mesh, [side]).sum() < n_nodes / 4
+
+
 def shuffled(mesh):
     """Return a mesh with its nodes and tetrahedra in random order."""
     random = np.random.default_rng(0)

@@ -81,3 +81,22 @@ def test_at_rest_the_inertia_of_a_piece_is_that_of_the_solid_plus_that_of_lumpin
         expected = solid.moment_inertia + lumping
         assert np.linalg.eigvalsh(lumping).min() > 0.0
         np.testing.assert_allclose(piece.inertia, expected, atol=1e-9 * np.trace(expected))
+
+
+def test_a_deformed_piece_has_the_volume_of_the_solid_and_its_centre_within_a_bound(tissue):
+    """The mass stays with the material, while the solid's density is uniform over its volume."""
+    body = tissue.snapshot()
+    of_tetrahedron = piece_of_tetrahedra(body)
+    found = zip(tissue.pieces(), solids(tissue, at_rest=False), strict=True)
+    for i, (piece, solid) in enumerate(found):
+        assert piece.volume == pytest.approx(solid.volume, rel=1e-9)
+        corners = np.stack([body.rest_positions, body.positions])[
+            :, body.tetrahedra[of_tetrahedron == i]
+        ]
+        volumes = np.linalg.det(corners[:, :, 1:] - corners[:, :, :1])
+        rest, now = volumes / volumes.sum(axis=1, keepdims=True)
+        arms = corners[1].mean(axis=1) - solid.center_mass
+        bound = np.abs(rest - now) @ np.linalg.norm(arms, axis=1)
+        size = float(np.linalg.norm(solid.extents))
+        assert np.linalg.norm(piece.centre - solid.center_mass) <= bound + 1e-9 * size
+        assert bound < 0.01 * size, "the strain is too large for this test"

@@ -1,4 +1,4 @@
-""""""
+"""Blocks of cells and of a lattice, cylinders, and the organ."""
 
 import numpy as np
 import pytest
@@ -118,6 +118,17 @@ def test_angles_of_a_lattice_are_60_and_90_degrees_inside_and_45_to_120_at_the_s
     assert inside == pytest.approx([60.0, 90.0])
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_a_lattice_block_has_no_preferred_direction(axis):
+    """Diagonals of the surface lie both ways on each side."""
+    mesh = lattice_block((2, 2, 2), (1.0, 1.0, 1.0))
+    faces = mesh.positions[boundary_faces(mesh.tetrahedra)]
+    on_side = faces[(faces[:, :, axis] == 1.0).all(axis=1)]
+    edges = np.delete(np.roll(on_side, 1, axis=1) - on_side, axis, axis=2)
+    ways, counts = np.unique(np.sign(edges.prod(axis=2)), return_counts=True)
+    assert ways.tolist() == [-1.0, 0.0, 1.0] and counts.tolist() == [4, 16, 4]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -138,6 +149,15 @@ def test_its_volume_is_that_of_the_circle_times_the_height(cells):
     assert volumes.min() > 0.0
     assert volumes.sum() == pytest.approx(np.pi * 0.015**2 * 0.04, rel=1e-12)
     assert len(mesh.tetrahedra) == 3 * 6 * cells[0] ** 2 * cells[1]
+
+
+@pytest.mark.parametrize("cells", [(1, 1), (2, 3), (4, 6)])
+def test_neighbours_in_a_cylinder_agree_on_every_face(cells):
+    mesh, (rings, layers) = cylinder(cells, 0.015, 0.04), cells
+    outer = 12 * rings**2 + 12 * rings * layers  # both ends, and two for each side of a prism
+    assert len(boundary_faces(mesh.tetrahedra)) == outer
+    assert sorted_faces(mesh.tetrahedra).counts.max() == 2
+    assert len(checked(mesh).mesh.positions) == len(mesh.positions)
 
 
 def test_its_elements_have_no_bad_shape():
