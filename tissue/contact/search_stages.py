@@ -30,8 +30,11 @@ from tissue.mesh.changes import Change
 BEGIN, _PAIRS, _LIST = 0, 1, 2
 """Stages of a search: it begins; pairs are updated; contacts are listed."""
 
-DONE, NO_ROOM_FOR_PAIRS, NO_ROOM_FOR_CONTACTS, NEEDS_SKIN = 0, 1, 2, 3
-"""Results of a search; the last one: skin is near itself, and has no faces yet."""
+DONE, NO_ROOM_FOR_PAIRS, NO_ROOM_FOR_CONTACTS = 0, 1, 2
+"""Results of a search."""
+
+NEEDS_SKIN, SEARCH_IS_DUE = 3, 4
+"""Results of `wake_contacts`; the first one: skin is near itself, and has no faces yet."""
 
 SEARCHES_TO_NORMALS = 8
 """Searches after which normals are computed again where no pair is updated."""
@@ -67,10 +70,9 @@ def take_changed_faces(search: SearchState, body: Body, change: Change) -> bool:
 def wake_contacts(search: SearchState, body: Body) -> int:
     """Test once in a time step whether skin is near itself, or the floor near.
 
-    `is_awake` says then whether anything could touch.
-
     Returns:
-        DONE, or NEEDS_SKIN: call again with faces of skin.
+        DONE; SEARCH_IS_DUE where anything could touch, and contacts were not searched since the
+        step began; or NEEDS_SKIN: call again with faces of skin.
     """
     if search.acts == 1 and search.is_tested == 0:
         is_near = find_self_proximity(search.proximity, search.motion, search.faces, body)
@@ -79,55 +81,13 @@ def wake_contacts(search: SearchState, body: Body) -> int:
         search.is_tested = 1
         if search.is_awake == 0 and floor_changes(search, body):
             search.is_awake = 1
-    return DONE
+    return SEARCH_IS_DUE if search.is_awake == 1 and search.is_searched == 0 else DONE
 
 
 @kernel
 def added_frequency(search: SearchState, limits: Limits) -> float:
     """Return the largest part of contact in w^2 of the body [1/s2]."""
     return limits.added if search.n_found > 0 else 0.0
-
-
-@kernel
-def prepare_contacts(
-    search: SearchState,
-    forces: PenaltyForces,
-    limits: Limits,
-    body: Body,
-    frequency_squared: FloatArray,
-    highest: float,
-    room: float,
-    seconds: float,
-) -> int:
-    """Find the contacts of a time step, unless this was done since it began.
-
-    Args:
-        search: Written.
-        forces: The contacts; written.
-        limits: Limits of their stiffness; written.
-        body: Where the nodes are.
-        frequency_squared: Bound on w^2 of each node without contact [1/s2].
-        highest: Bound on w^2 of the body without contact [1/s2].
-        room: What may be added to that without another step [1/s2].
-        seconds: Length of the time step [s].
-
-    Returns:
-        DONE, or what needs room, to call again.
-    """
-    if search.is_searched == 1:
-        return DONE
-    outcome = wake_contacts(search, body)
-    if outcome != DONE or search.is_awake == 0:
-        return outcome
-    outcome = search_contacts(
-        search, forces, limits, body, frequency_squared, highest, room, seconds
-    )
-    if outcome == DONE:
-        search.is_searched = 1
-        search.n_found = forces.n_contacts
-        if search.n_found > 0:
-            search.has_touched = 1
-    return outcome
 
 
 @kernel
@@ -160,6 +120,7 @@ def search_contacts(
             forces.n_contacts = forces.n_fading = 0
             search.n_listings += 1
             search.is_pairing_due = 1
+            _note_search(search, forces)
             return DONE
         search.is_pairing = _needs_pairing(search, body, where != IN_BALL)
         _renew_normals(search, body)
@@ -190,7 +151,17 @@ def search_contacts(
         search.is_listing_due = 1
     note_places(motion, body)
     search.stage = BEGIN
+    _note_search(search, forces)
     return DONE
+
+
+@kernel
+def _note_search(search: SearchState, forces: PenaltyForces) -> None:
+    """Note that contacts were searched in this time step, and how many there are."""
+    search.is_searched = 1
+    search.n_found = forces.n_contacts
+    if search.n_found > 0:
+        search.has_touched = 1
 
 
 @kernel

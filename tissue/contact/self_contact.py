@@ -31,8 +31,9 @@ from tissue.contact.search_stages import (
     NO_ROOM_FOR_PAIRS,
     SEARCHES_TO_NORMALS,
     begin_contacts,
-    prepare_contacts,
+    search_contacts,
     take_changed_faces,
+    wake_contacts,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes
@@ -133,6 +134,7 @@ class SelfContact:
         self.limits = new_limits(node_size, added)
         """Limits of the stiffness and the recovery of contacts."""
         self.forces = new_penalty_forces(n_nodes, friction, time)
+        self._search_contacts = SameTypes(search_contacts)
         self._find_pieces(body)
 
     @property
@@ -180,21 +182,35 @@ class SelfContact:
             room: What may be added to that without another step [1/s2].
             seconds: Length of the time step [s].
         """
-        numbers = frequency_squared, highest, room, seconds
         while True:
-            found = prepare_contacts(self.search, self.forces, self.limits, body, *numbers)
+            outcome = wake_contacts(self.search, body)
+            if outcome == DONE:
+                return
+            self.settle(outcome, body, frequency_squared, highest, room, seconds)
+
+    def settle(
+        self,
+        outcome: int,
+        body: Body,
+        frequency_squared: FloatArray,
+        highest: float,
+        room: float,
+        seconds: float,
+    ) -> None:
+        """Do what `wake_contacts` returned; the other arguments are those of `prepare`."""
+        if outcome == NEEDS_SKIN:
+            self._take_skin(with_skin(self.search.faces, body))
+            return
+        while True:
+            of_contact = self.search, self.forces, self.limits
+            bounds = highest, room, seconds
+            found = self._search_contacts.call(*of_contact, body, frequency_squared, *bounds)
             if found == DONE:
                 return
-            self.make_room(found, body)
-
-    def make_room(self, lacking: int, body: Body) -> None:
-        """Make room for what a search found full (`tissue.contact.search_stages.DONE`)."""
-        if lacking == NEEDS_SKIN:
-            self._take_skin(with_skin(self.search.faces, body))
-        elif lacking == NO_ROOM_FOR_PAIRS:
-            self._double_room_for_pairs()
-        else:
-            self._make_room_for_contacts(body)
+            if found == NO_ROOM_FOR_PAIRS:
+                self._double_room_for_pairs()
+            else:
+                self._make_room_for_contacts(body)
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""

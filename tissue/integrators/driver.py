@@ -21,12 +21,7 @@ from tissue.blade.blade_context import (
 from tissue.blade.edge import Edge
 from tissue.contact.response.stiffness import Limits
 from tissue.contact.search.search_state import SearchState
-from tissue.contact.search_stages import (
-    DONE,
-    added_frequency,
-    prepare_contacts,
-    wake_contacts,
-)
+from tissue.contact.search_stages import DONE, added_frequency, wake_contacts
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
@@ -55,8 +50,9 @@ NOT_FINITE: Final = -1
 UNSTABLE: Final = -2
 """The motion became unstable; the increment is not done."""
 
-LACKS_FOR_CONTACTS: Final = 10
-"""The search for contacts needs room; this and what it needs (`tissue.contact.search_stages`)."""
+LACKS_CONTACTS: Final = 10
+"""Contacts are to be searched: this and what `wake_contacts` returned. They are a program of their
+own, which settling a body needs, too: as a part of this one they would be compiled twice."""
 
 FIND_CONTACTS: Final = 0
 """Stage in which an increment begins: the search for contacts."""
@@ -127,7 +123,7 @@ def relax(
         step.geoms.work = step.geoms.dissipated = 0.0
         if step.geoms.n_contacts > 0:
             wake(choice)
-    outcome = _find_contacts(relaxation, part, held)
+    outcome = _take_contacts(relaxation, part, held)
     if outcome != RELAXED:
         return outcome
     outcome = _begin(relaxation, edge, has_blade, part)
@@ -177,8 +173,8 @@ def _take_step(
 
 
 @kernel
-def _find_contacts(relaxation: Relaxation, part: _Part, held: float) -> int:
-    """Find the contacts of an increment, but of a body at rest; return what needs room."""
+def _take_contacts(relaxation: Relaxation, part: _Part, held: float) -> int:
+    """Take the contacts of an increment, but of a body at rest; return what they lack."""
     if relaxation.stage != FIND_CONTACTS:
         return RELAXED
     choice, step = relaxation.choice, relaxation.step
@@ -186,13 +182,9 @@ def _find_contacts(relaxation: Relaxation, part: _Part, held: float) -> int:
     span = part.dt * (part.end - part.begin)
     if span > 0.0 and choice.is_at_rest == 0:
         outcome = wake_contacts(search, step.body)
-        if outcome == DONE and search.is_awake == 1:
-            elastic = step.elastic
-            room = room_for_contact(choice, step, span)
-            bounds = elastic.frequency_squared, elastic.highest, room
-            outcome = prepare_contacts(search, step.contacts, limits, step.body, *bounds, span)
         if outcome != DONE:
-            return LACKS_FOR_CONTACTS + outcome
+            choice.room = room_for_contact(choice, step, span)
+            return LACKS_CONTACTS + outcome
     choice.of_contact = added_frequency(search, limits) + held
     relaxation.stage = _FACES
     return RELAXED

@@ -9,7 +9,7 @@ from tissue.core.limits import MANY_SUBSTEPS, MOST_SUBSTEPS
 from tissue.cut_settings import undamped_steps
 from tissue.forces.step_context import Increment
 from tissue.integrators.driver import (
-    LACKS_FOR_CONTACTS,
+    LACKS_CONTACTS,
     NOT_FINITE,
     RELAXED,
     UNSTABLE,
@@ -71,14 +71,17 @@ class GlobalStepper:
             outcome = self._relax.call(arrays, edge, has_blade, *numbers, is_again)
             if outcome == RELAXED:
                 break
-            arrays, is_again = self._with_room(outcome, system, arrays), True
+            arrays = self._with_room(outcome, system, arrays, increment.span)
+            is_again = True
         n = arrays.choice.done
         if n > 0 and system.increments_to_pieces > 0:
             system.find_new_loose_pieces()
         return n
 
-    def _with_room(self, outcome: int, system: TissueModel, arrays: Relaxation) -> Relaxation:
-        """Return the arrays with room for what an increment lacked.
+    def _with_room(
+        self, outcome: int, system: TissueModel, arrays: Relaxation, span: float
+    ) -> Relaxation:
+        """Return the arrays with what an increment of `span` [s] lacked: room, or contacts.
 
         Raises:
             UnstableError: it lacked nothing, but went wrong.
@@ -92,8 +95,10 @@ class GlobalStepper:
         if outcome == NOT_FINITE:
             raise not_finite()
         blade = arrays.blade
-        if outcome > LACKS_FOR_CONTACTS:
-            system.contact.make_room(outcome - LACKS_FOR_CONTACTS, system.body)
+        if outcome > LACKS_CONTACTS:
+            elastic = system.elasticity.arrays
+            bounds = elastic.frequency_squared, elastic.highest, arrays.choice.room
+            system.contact.settle(outcome - LACKS_CONTACTS, system.body, *bounds, span)
         else:
             blade = system.interaction.with_room(outcome, blade)
         return self.arrays(system, blade, arrays.stage)

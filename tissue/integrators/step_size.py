@@ -108,6 +108,8 @@ class StepChoice(Arrays):
     """Length of the increment [s]."""
     of_contact: FloatCell
     """What contact adds to w^2 at most [1/s2]; written before an increment begins."""
+    room: FloatCell
+    """What contact may add to w^2 of the body without another step [1/s2]."""
     least: FloatCell
     """Bound on w^2 with the body at rest, the blade and contact [1/s2]."""
     added: FloatCell
@@ -154,6 +156,7 @@ def new_step_choice(
         end=0.0,
         span=0.0,
         of_contact=0.0,
+        room=0.0,
         least=0.0,
         added=0.0,
         needed=0.0,

@@ -1,4 +1,4 @@
-"""The begin of a time step in one call: checks, edge, contacts with geoms, number of increments.
+"""The begin of a time step in one call: checks, edge, number of increments.
 
 Each call from Python costs 1 to 4 us. Where the begin needs something, a call returns; the next one
 goes on behind it.
@@ -9,10 +9,6 @@ from typing import Final
 
 from tissue.blade.edge import Edge, is_other_length
 from tissue.blade.forces import begin_blade_step
-from tissue.contact.geometry.faces import Faces
-from tissue.contact.geoms.contact_search import LIST_IS_FULL, find_geom_contacts
-from tissue.contact.geoms.geom_arrays import GeomSearch, largest_motion
-from tissue.contact.geoms.geom_contact import FARTHEST_IN_A_SUBSTEP
 from tissue.contact.search_stages import added_frequency, begin_contacts
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
@@ -34,8 +30,6 @@ OTHER_EDGE: Final = 4
 """The edge has another length than the one that holds the tissue."""
 UNSOUND_EDGE: Final = 5
 """No blade can move so, as far as the squares of its numbers are finite."""
-GEOMS_LACK_ROOM: Final = 6
-"""The list of contacts with geoms is full."""
 
 
 class FrameContext(Arrays, two_precisions=True):
@@ -47,10 +41,6 @@ class FrameContext(Arrays, two_precisions=True):
     """Distance that the edge moves in the time step [m]."""
     relaxation: Relaxation
     """What the relaxation of an increment works on."""
-    geom_search: GeomSearch
-    """What the search for contacts with geoms works on."""
-    geom_faces: Faces
-    """Skin and lips, which may touch geoms."""
     node_size: float
     """Mean node size [m]."""
 
@@ -92,17 +82,10 @@ def begin_frame(
     length = norm(sub(edge.tip_t1, edge.heel_t1)) if has_blade else 0.0
     if after < OTHER_EDGE and is_other_length(length, edge_length):
         return OTHER_EDGE
-    if after < GEOMS_LACK_ROOM:
-        is_checked = not has_blade or after == UNSOUND_EDGE
-        if not begin_blade_step(step.blade, step.body, edge, dt, is_checked):
-            return UNSOUND_EDGE
-        begin_contacts(frame.relaxation.contacts, step.contacts)
-    if len(step.geoms.geoms.shape) > 0:
-        search_of_geoms, faces = frame.geom_search, frame.geom_faces
-        if find_geom_contacts(search_of_geoms, step.geoms, faces, step.body, dt) == LIST_IS_FULL:
-            return GEOMS_LACK_ROOM
-        largest = largest_motion(step.geoms.geoms) / FARTHEST_IN_A_SUBSTEP
-        frame.n_increments = max(frame.n_increments, math.ceil(largest))
+    is_checked = not has_blade or after == UNSOUND_EDGE
+    if not begin_blade_step(step.blade, step.body, edge, dt, is_checked):
+        return UNSOUND_EDGE
+    begin_contacts(frame.relaxation.contacts, step.contacts)
     return BEGUN
 
 

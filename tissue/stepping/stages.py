@@ -34,7 +34,6 @@ from tissue.solver_settings import SolverSettings
 from tissue.stepping.energy_audit import Audit
 from tissue.stepping.frame import (
     BEGUN,
-    GEOMS_LACK_ROOM,
     MANY_STEPS,
     NOT_FINITE_BEFORE,
     OTHER_EDGE,
@@ -122,16 +121,14 @@ class StepStages:
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
         model, incision, handles = self.model, self.incision, self.handles
-        frame = self._begin(sweep, edge, dt)
-        n, travel = frame.n_increments * self.global_stepper.refinement, frame.travel
+        n, travel = self._begin(sweep, edge, dt)
         n_substeps = 0
         collision = topology = relaxation = 0.0  # wall times
         now = perf_counter()
         for i in range(n):
             increment, started = Increment(edge, dt, i / n, (i + 1) / n), now
             # RX, relaxation: forces, contact, motion, slip of the blade
-            frame = frame if i == 0 else self._frame_now()
-            n_substeps += self._relax(frame, increment, has_blade)
+            n_substeps += self._relax(increment, has_blade)
             relaxed = perf_counter()
             # CD, collision detection: path, active tetrahedra, crossed edges
             is_crossed = has_blade and self._detect(increment)
@@ -155,11 +152,11 @@ class StepStages:
         stage_times = StageTimes(collision, topology, relaxation)
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
-    def _begin(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> FrameContext:
+    def _begin(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> tuple[int, float]:
         """Take the edge, start the totals of a step, and find where geoms may touch.
 
         Returns:
-            What the kernels of the step work on: it says how many increments there are.
+            Number of increments, and how far the edge moves [m].
         """
         model, has_blade, outcome = self.model, sweep is not None, BEGUN
         while True:
@@ -169,11 +166,13 @@ class StepStages:
             if outcome == BEGUN:
                 break
             self._settle(outcome, sweep, edge, dt)
-        model.geoms.seconds = dt
+        n, travel = frame.n_increments, frame.travel
+        if model.geoms.geoms:
+            n = max(n, model.geoms.begin_step(model.body, dt))
         model.interaction.edge_now = (edge, 0.0)
         if self.handles.act:
             self.handles.begin_step(dt)
-        return frame
+        return n * self.global_stepper.refinement, travel
 
     def _settle(self, outcome: int, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
         """Do what the begin of a step needs, or refuse the step; see `begin_frame`."""
@@ -184,8 +183,6 @@ class StepStages:
             expect_few_steps(model, self.global_stepper.method.number, dt)
         elif outcome == TOO_FAR:
             self.incision.n_increments(edge.travel)
-        elif outcome == GEOMS_LACK_ROOM:
-            model.geoms.make_room(model.body)
         elif sweep is None:
             self.take_edge(None)
         else:
@@ -193,7 +190,7 @@ class StepStages:
             if outcome == OTHER_EDGE:
                 self.take_edge(edge)
 
-    def _relax(self, frame: FrameContext, increment: Increment, has_blade: bool) -> int:
+    def _relax(self, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
         model, handles, audit = self.model, self.handles, self.audit
         before, is_driven = 0.0, handles.act
@@ -201,8 +198,8 @@ class StepStages:
             if handles.loads.act or handles.attachments.act:
                 self.global_stepper.wake()
             before = handles.begin_increment(increment, has_blade)
-            frame = self._frame_now()
-        n = self.integrator.relax(model, frame.relaxation, increment, has_blade)
+        arrays = self._frame_now().relaxation
+        n = self.integrator.relax(model, arrays, increment, has_blade)
         geoms = model.geoms.arrays
         of_loads = handles.end_increment(before, increment) if is_driven else 0.0
         audit.work_of_loads += of_loads + geoms.work
@@ -277,8 +274,6 @@ class StepStages:
                 n_increments=1,
                 travel=0.0,
                 relaxation=stepper.arrays(model, blade),
-                geom_search=geoms.search,
-                geom_faces=geoms.faces,
                 node_size=float(model.node_size),
             )
             self._parts = (*parts[:-1], stepper.choice)

@@ -26,6 +26,7 @@ from tissue.contact.geoms.geom_arrays import (
     Geoms,
     GeomSearch,
     grown_geom_contacts,
+    largest_motion,
     lead_geoms,
     new_geom_contacts,
     new_geoms,
@@ -121,7 +122,8 @@ class GeomContact:
             **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
         )
         """Scratch of the search; another struct where its arrays grow."""
-        self._lead, self._sum = SameTypes(lead_geoms), SameTypes(sum_wrenches)
+        self._find, self._lead = SameTypes(find_geom_contacts), SameTypes(lead_geoms)
+        self._sum = SameTypes(sum_wrenches)
         self.seconds = 0.0
         """Length of the last time step [s]."""
         self.are_led = False
@@ -220,18 +222,21 @@ class GeomContact:
         """Whether any node is near a geom."""
         return bool(self.geoms) and self.arrays.n_contacts > 0
 
-    def begin_step(self, body: Body, dt: float) -> None:
-        """Find the contacts of a step of that length [s]."""
+    def begin_step(self, body: Body, dt: float) -> int:
+        """Find the contacts of a step of that length [s].
+
+        Returns:
+            Number of increments of the step, so that no geom passes unseen.
+        """
         self.seconds = dt
         if not self.geoms:
-            return
-        while find_geom_contacts(self.search, self.arrays, self.faces, body, dt) == LIST_IS_FULL:
-            self.make_room(body)
-
-    def make_room(self, body: Body) -> None:
-        """Make twice the room for contacts."""
-        # The arrays have two lists.
-        self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom), len(body.rest))
+            return 1
+        while self._find.call(self.search, self.arrays, self.faces, body, dt) == LIST_IS_FULL:
+            # Twice the room: the arrays have two lists.
+            self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom), len(body.rest))
+        if not self.are_led:
+            return 1
+        return max(1, math.ceil(largest_motion(self.arrays.geoms) / FARTHEST_IN_A_SUBSTEP))
 
     def wrenches(self) -> tuple[FloatArray, FloatArray]:
         """Return forces and torques of the tissue on the geoms, averaged over the last step.
