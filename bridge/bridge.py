@@ -291,13 +291,11 @@ class Bridge:
 
     def _advance(self, arm: Pose, dt: float) -> Six:
         """Advance the tissue by this frame, where it answers in each, and return its wrench."""
-        before = self._queried_at or arm
+        before, engaged = self._queried_at or arm, self._engaged()
         driven = self._driven.poses
         # It stays where a link fails: the next frame then does both.
         self._path.append(PathPart(arm, dt, driven))
-        touches, self.touching = self._broad_phase.overlaps(
-            before, arm, dt, engaged=self._engaged()
-        )
+        touches, self.touching = self._broad_phase.overlaps(before, arm, dt, engaged=engaged)
         self._n_rejected += not touches
         sweep = BladeSweep(before.segment, arm.segment) if touches else None
         result = self._query.step(sweep, dt, driven)

@@ -101,7 +101,10 @@ class TissueFrame:
     def numbers_to_world(self, wrench: Six, point: Triple) -> Wrench:
         """Return force [N] and torque [N m] of the tissue frame about a point, in the world."""
         px, py, pz = point
-        return self.wrench_to_world(Wrench.of_numbers((*wrench, px, py, pz)))
+        if self.is_rotated:
+            return self.wrench_to_world(Wrench.of_numbers((*wrench, px, py, pz)))
+        x, y, z = self._place
+        return Wrench.of_numbers((*wrench, px + x, py + y, pz + z))
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
         """Return a fixture given in the world in the tissue frame."""

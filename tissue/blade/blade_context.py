@@ -4,10 +4,7 @@ A call from Python takes 0.4 us for each struct that it passes, measured on a bu
 searches, path and report took 83 us of a frame with a call for each function, and 44 us so.
 """
 
-from operator import attrgetter
-from typing import Any, Final, Self
-
-import numpy as np
+from typing import Final
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import Edge, motion_at, pose_at
@@ -22,11 +19,9 @@ from tissue.blade.faces_search import blade_box, find_faces, release_faces
 from tissue.blade.forces import clear_blade_forces
 from tissue.blade.path_tracing import trace_path
 from tissue.blade.spine_search import release_spine, update_spine
-from tissue.blade.wrench import BladeReport, WrenchReport, write_means, write_report
-from tissue.contact.geoms.geom_contact import GeomContact
+from tissue.blade.wrench import WrenchReport, write_means, write_report
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.lazy_fields import lazy_fields
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import vec3
 from tissue.cutting.blade_path import Path, path_travel
@@ -34,7 +29,6 @@ from tissue.geometry.aabb import box_between, overlap
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import TetrahedronGrid, fits, list_appended, list_moved
-from tissue.types import RigidContacts, StepResult
 
 NOT_SEARCHED: Final = 0
 """There was no search: the blade is far, or no sample of the edge can have entered."""
@@ -177,44 +171,3 @@ def report_step(context: BladeContext, edge: Edge, dt: float) -> None:
     for corner in range(2):
         for axis in range(3):
             report.bounds[corner, axis] = context.bounds[corner, axis]
-
-
-@lazy_fields(
-    contacts=lambda result: result.all_contacts(),
-    wrench_t1=lambda result: result.report.wrench,
-    force_on_tissue=lambda result: result.report.mean_force_on_tissue,
-)
-class LazyResult(StepResult):
-    """The result of a step, with a copy of what the blade reported."""
-
-    report: BladeReport
-    geoms: GeomContact | None
-    has_views = True
-    """Contacts are views of the report of the blade."""
-    contacts_of_blade = property(attrgetter("report.contacts"))
-
-    @classmethod
-    def of(cls, report: BladeReport, geoms: GeomContact | None, *others: object) -> Self:
-        """Return the result of a step.
-
-        Args:
-            report: That of the blade.
-            geoms: Contact with geoms, where there is any.
-            others: The fields of `StepResult` after bounds.
-        """
-        mean_wrench, stiffness, _, bounds, _, _ = report
-        first = (mean_wrench, None, stiffness, None, None, bounds)
-        result: Self = _new(cls, (*first, *others))
-        result.report, result.geoms = report, geoms
-        return result
-
-    def all_contacts(self) -> RigidContacts:
-        """Return the contacts of the blade, and behind them those of geoms."""
-        of_blade = self.report.contacts
-        if self.geoms is None:
-            return of_blade
-        both = zip(of_blade, self.geoms.contacts(), strict=True)
-        return RigidContacts._make(map(np.concatenate, both))
-
-
-_new: Any = tuple.__new__

@@ -5,7 +5,8 @@ The wrench at the end, its stiffness and the contacts follow from the same point
 torques cancel but for rounding.
 """
 
-from typing import NamedTuple
+from operator import attrgetter
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -27,13 +28,15 @@ from tissue.blade.spine_contact import (
     spine_side,
     touched_point,
 )
+from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
+from tissue.core.lazy_fields import lazy_fields
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.three_vectors import Wrench
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
-from tissue.types import RigidContacts
+from tissue.types import RigidContacts, StepResult
 
 
 class WrenchReport(Arrays):
@@ -171,6 +174,43 @@ def contacts_of(report: WrenchReport, n: int) -> RigidContacts:
         report.cut_area[:n],
         np.full(n, -1),
     )
+
+
+@lazy_fields(
+    contacts=lambda result: result.all_contacts(),
+    wrench_t1=lambda result: result.report.wrench,
+    force_on_tissue=lambda result: result.report.mean_force_on_tissue,
+)
+class LazyResult(StepResult):
+    """The result of a step, with a copy of what the blade reported."""
+
+    report: BladeReport
+    geoms: GeomContact | None
+    has_views = True
+    """Contacts are views of the report of the blade."""
+    contacts_of_blade = property(attrgetter("report.contacts"))
+
+    @classmethod
+    def of(cls, report: BladeReport, geoms: GeomContact | None, *others: object) -> Self:
+        """Return the result of a step.
+
+        Args:
+            report: That of the blade.
+            geoms: Contact with geoms, where there is any.
+            others: The fields of `StepResult` after bounds.
+        """
+        first = (report.mean_wrench, None, report.stiffness, None, None, report.bounds)
+        result: Self = tuple.__new__(cls, (*first, *others))
+        result.report, result.geoms = report, geoms
+        return result
+
+    def all_contacts(self) -> RigidContacts:
+        """Return the contacts of the blade, and behind them those of geoms."""
+        of_blade = self.report.contacts
+        if self.geoms is None:
+            return of_blade
+        both = zip(of_blade, self.geoms.contacts(), strict=True)
+        return RigidContacts._make(map(np.concatenate, both))
 
 
 @kernel

@@ -197,7 +197,16 @@ class SelfContact:
         room: float,
         seconds: float,
     ) -> None:
-        """Do what `wake_contacts` returned; the other arguments are those of `prepare`."""
+        """Do what a test whether anything could touch asks for.
+
+        Args:
+            outcome: Returned by `wake_contacts`; not DONE.
+            body: Where the nodes are.
+            frequency_squared: Bound on w^2 of each node without contact [1/s2].
+            highest: Bound on w^2 of the body without contact [1/s2].
+            room: What may be added to that without another step [1/s2].
+            seconds: Length of the time step [s].
+        """
         if outcome == NEEDS_SKIN:
             self._take_skin(with_skin(self.search.faces, body))
             return

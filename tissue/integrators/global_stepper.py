@@ -71,7 +71,7 @@ class GlobalStepper:
             outcome = self._relax.call(arrays, edge, has_blade, *numbers, is_again)
             if outcome == RELAXED:
                 break
-            arrays = self._with_room(outcome, system, arrays, increment.span)
+            arrays = self._with_room(outcome, system, arrays, dt * (end - begin))
             is_again = True
         n = arrays.choice.done
         if n > 0 and system.increments_to_pieces > 0:
@@ -98,7 +98,10 @@ class GlobalStepper:
         if outcome > LACKS_CONTACTS:
             elastic = system.elasticity.arrays
             bounds = elastic.frequency_squared, elastic.highest, arrays.choice.room
-            system.contact.settle(outcome - LACKS_CONTACTS, system.body, *bounds, span)
+            contact = system.contact
+            contact.settle(outcome - LACKS_CONTACTS, system.body, *bounds, span)
+            if contact.search is arrays.contacts and contact.forces is arrays.step.contacts:
+                return arrays
         else:
             blade = system.interaction.with_room(outcome, blade)
         return self.arrays(system, blade, arrays.stage)

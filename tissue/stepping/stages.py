@@ -5,11 +5,12 @@ from time import perf_counter
 
 import numpy as np
 
-from tissue.blade.blade_context import NOT_ENGAGED, LazyResult, trace
+from tissue.blade.blade_context import NOT_ENGAGED, trace
 from tissue.blade.edge import NOWHERE, Edge, edge_of, edge_or_error
 from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade.toughness import expect_toughness_in_range
+from tissue.blade.wrench import LazyResult
 from tissue.body_view import BodyChunks, bounds_of_body
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes
