@@ -64,7 +64,7 @@ def _width_of(_: Any, array: Operand) -> Any:
     return ir.Constant(I64, _vector_of(array).count)
 
 
-def alike(value: float, a: Lanes) -> Lanes:
+def splat(value: float, a: Lanes) -> Lanes:
     """Return a number in all lanes of a vector of the type of `a`."""
     return np.full_like(a, value)
 
@@ -92,8 +92,8 @@ def sum_of_lanes(a: Lanes) -> float:
 
 for _kind in _BOTH:
 
-    @intrinsic(alike, types.Float, _kind, result=_kind)
-    def _alike(builder: Any, value: Any, a: Any) -> Any:
+    @intrinsic(splat, types.Float, _kind, result=_kind)
+    def _splat(builder: Any, value: Any, a: Any) -> Any:
         return in_all_lanes(builder, _converted(builder, value, a.type.element), a.type)
 
     @intrinsic(store_block, types.Array, types.Integer, _kind, result=types.void)
@@ -107,15 +107,15 @@ for _kind in _BOTH:
         return _converted(builder, fold_in_pairs(terms, builder.fadd), ir.DoubleType())
 
 
-def gathered_alike(a: Lanes, values: FloatArray, of: SlotArray, i: int) -> Lanes:
+def gathered_like(a: Lanes, values: FloatArray, of: SlotArray, i: int) -> Lanes:
     """Return `values` at `of[i]` and the places behind it, as a vector of the type of `a`."""
     return values[of[i : i + len(a)]].astype(a.dtype)
 
 
 for _kind in _BOTH:
 
-    @intrinsic(gathered_alike, _kind, types.Array, types.Array, types.Integer, result=_kind)
-    def _gathered_alike(builder: Any, a: Any, values: Operand, of: Operand, i: Any) -> Any:
+    @intrinsic(gathered_like, _kind, types.Array, types.Array, types.Integer, result=_kind)
+    def _gathered_like(builder: Any, a: Any, values: Operand, of: Operand, i: Any) -> Any:
         made = ir.Constant(a.type, ir.Undefined)
         for lane in range(a.type.count):
             place = builder.load(of.at(builder.add(i, i.type(lane))))

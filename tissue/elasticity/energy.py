@@ -20,7 +20,7 @@ dissipated are estimates; their sum is exact.
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, store_point
-from tissue.core.simd_blocks import alike, load_block, logarithm, sum_of_lanes, width_of
+from tissue.core.simd_blocks import load_block, logarithm, splat, sum_of_lanes, width_of
 from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.collapse import collapse_energy
@@ -163,7 +163,7 @@ def _relaxed_energies(solid: Solid, block: int) -> Lanes:
     # R : E = R : H + sum over the rows h of H of h . R h / 2
     strained = dot(rx, x) + dot(ry, y) + dot(rz, z)
     squares = _quadratic(x, rx, ry, rz) + _quadratic(y, rx, ry, rz) + _quadratic(z, rx, ry, rz)
-    total = alike(-1.0, v) * (strained + alike(0.5, v) * squares)
+    total = splat(-1.0, v) * (strained + splat(0.5, v) * squares)
     total = total - relaxed_pressure(solid, block) * own_dilatation(solid, block, v)
     for term in range(n_terms):
         at = width * N_RELAXED * (n_terms * block + term)
@@ -195,10 +195,10 @@ def _complementary(solid: Solid, term: int, rx: Vec3, ry: Vec3, rz: Vec3, r: Lan
     mu, modulus = law.shear_modulus, law.lam_of_tetrahedra + law.lam_of_nodes
     bulk = modulus - law.excess + mu * 2.0 / 3.0
     trace = rx.x + ry.y + rz.z
-    deviator = dot(rx, rx) + dot(ry, ry) + dot(rz, rz) - alike(1.0 / 3.0, r) * trace * trace
-    y = larger(alike(0.5 / (mu * g) ** 2, r) * deviator, alike(0.0, r))
-    shear = alike(0.5 * mu * g, r) * complementary_energy(law, y)
-    return shear + alike(0.5 * bulk / (g * modulus**2), r) * r * r
+    deviator = dot(rx, rx) + dot(ry, ry) + dot(rz, rz) - splat(1.0 / 3.0, r) * trace * trace
+    y = larger(splat(0.5 / (mu * g) ** 2, r) * deviator, splat(0.0, r))
+    shear = splat(0.5 * mu * g, r) * complementary_energy(law, y)
+    return shear + splat(0.5 * bulk / (g * modulus**2), r) * r * r
 
 
 @inlined
@@ -215,11 +215,11 @@ def _energies(solid: Solid, block: int) -> Lanes:
     else:
         trace = x.x + y.y + z.z
         grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
-        shear = grown - logarithm(alike(1.0, v) + alike(0.25, v) * grown)
+        shear = grown - logarithm(splat(1.0, v) + splat(0.25, v) * grown)
     dilatation = load_block(solid.dilated, width * (1 + block))
     ratio = own_dilatation(solid, block, v)
-    bulk = dilatation * (ratio + alike(2.0 * (1.0 - law.a), v))
-    return alike(0.5 * law.mu, v) * v * shear + alike(0.5 * law.lam_of_tetrahedra, v) * bulk
+    bulk = dilatation * (ratio + splat(2.0 * (1.0 - law.a), v))
+    return splat(0.5 * law.mu, v) * v * shear + splat(0.5 * law.lam_of_tetrahedra, v) * bulk
 
 
 @kernel

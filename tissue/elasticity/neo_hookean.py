@@ -25,9 +25,9 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, Point, point, point_of
 from tissue.core.simd_blocks import (
-    alike,
     load_block,
     points_of_rows,
+    splat,
     store_block,
     store_everywhere,
     store_row,
@@ -195,13 +195,13 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
     trace = x.x + y.y + z.z
     cx, cy, cz = cofactors_of(x, y, z)
     if stiffens(law):
-        rest = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
-        s = alike(0.0, v)
+        rest = splat(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        s = splat(0.0, v)
     else:
         s = isotropic_factor(law, trace, x, y, z)
-        rest = alike(0.75 * law.mu, v)
+        rest = splat(0.75 * law.mu, v)
     # The factors of H, K and 1, times -V:
-    minus_v = alike(-1.0, v) * v
+    minus_v = splat(-1.0, v) * v
     a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
     px = Vec3(
         a * x.x + b * (trace - x.x + cx.x) + c,
@@ -223,7 +223,7 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
     f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
     f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
     f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))
-    f0 = scale(alike(-1.0, v), add(f1, add(f2, f3)))
+    f0 = scale(splat(-1.0, v), add(f1, add(f2, f3)))
     row = 4 * width * (1 + block)
     store_rows(solid.forces, row, f0.x, f0.y, f0.z)
     store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
@@ -234,11 +234,11 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
 @inlined
 def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return the elastic pressures p of the tetrahedra of a block [Pa], of volumes `v` [m3]."""
-    law, p = solid.law, alike(0.0, v)
+    law, p = solid.law, splat(0.0, v)
     if law.lam_of_nodes != 0.0:
-        p = alike(0.25, v) * _pressure_of_nodes(solid, block)
+        p = splat(0.25, v) * _pressure_of_nodes(solid, block)
     if law.lam_of_tetrahedra != 0.0:
-        p = p + alike(law.lam_of_tetrahedra, v) * own_dilatation(solid, block, v)
+        p = p + splat(law.lam_of_tetrahedra, v) * own_dilatation(solid, block, v)
     return p
 
 
@@ -246,7 +246,7 @@ def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
 def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return J - 1 of the tetrahedra of a block by themselves, after `displacement_gradients`."""
     dilated = load_block(solid.dilated, width_of(solid.shape) * (1 + block))
-    return dilated / (v + alike(NO_VOLUME, v))
+    return dilated / (v + splat(NO_VOLUME, v))
 
 
 @inlined
@@ -261,7 +261,7 @@ def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3
         z: Third row.
     """
     grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-    return alike(0.25 * law.mu, trace) * grown / (grown + alike(4.0, trace))
+    return splat(0.25 * law.mu, trace) * grown / (grown + splat(4.0, trace))
 
 
 @inlined

@@ -15,7 +15,7 @@ Forces need the sum over all terms, which is kept beside the terms.
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import alike, load_block, width_of
+from tissue.core.simd_blocks import load_block, splat, width_of
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, Solid
 
@@ -86,7 +86,7 @@ def with_relaxed(
     rx, ry, rz = rows_of_stress(solid.relaxed, at)
     px, py, pz = stress
     x, y, z = gradient
-    one = alike(1.0, v)
+    one = splat(1.0, v)
     return (
         _with_product(px, v, Vec3(x.x + one, x.y, x.z), rx, ry, rz),
         _with_product(py, v, Vec3(y.x, y.y + one, y.z), rx, ry, rz),

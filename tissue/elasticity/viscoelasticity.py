@@ -27,7 +27,7 @@ import math
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import alike, load_block, store_block, width_of
+from tissue.core.simd_blocks import load_block, splat, store_block, width_of
 from tissue.core.simd_rows import larger, where_larger
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid
@@ -63,7 +63,7 @@ def relax_blocks(solid: Solid, begin: int, end: int) -> None:
     width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
     for block in range(begin, end):
         xx, yy, zz, yz, xz, xy, p = _elastic_stress(solid, block)
-        zero = alike(0.0, p)
+        zero = splat(0.0, p)
         rxx, ryy, rzz, ryz, rxz, rxy, r = zero, zero, zero, zero, zero, zero, zero
         for term in range(n_terms):
             share, weight = solid.relaxing_shares[term], solid.relaxation_weights[term]
@@ -97,7 +97,7 @@ def _relaxed(terms: FloatArray, at: int, share: float, weight: float, stress: La
         stress: The same number of the elastic stress.
     """
     old = load_block(terms, at)
-    new = old + alike(weight, old) * (alike(share, old) * stress - old)
+    new = old + splat(weight, old) * (splat(share, old) * stress - old)
     store_block(terms, at, new)
     return new
 
@@ -116,25 +116,25 @@ def _elastic_stress(
     cx, cy, cz = cofactors_of(x, y, z)
     trace = x.x + y.y + z.z
     if stiffens(law):
-        c = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
-        s = alike(0.0, v)
+        c = splat(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        s = splat(0.0, v)
     else:
-        c, s = alike(0.75 * law.mu, v), isotropic_factor(law, trace, x, y, z)
+        c, s = splat(0.75 * law.mu, v), isotropic_factor(law, trace, x, y, z)
     # The columns of K = (tr H) 1 - H^T + cof H:
     a = Vec3(trace - x.x + cx.x, cy.x - x.y, cz.x - x.z)
     b = Vec3(cx.y - y.x, trace - y.y + cy.y, cz.y - y.z)
     d = Vec3(cx.z - z.x, cy.z - z.y, trace - z.z + cz.z)
     dilatation = own_dilatation(solid, block, v)
-    ratio = alike(1.0, v) + dilatation
-    of_c = c / larger(ratio, alike(SMALLEST_RATIO, v))
-    of_c = where_larger(ratio, alike(0.0, v), of_c, alike(0.0, v))
+    ratio = splat(1.0, v) + dilatation
+    of_c = c / larger(ratio, splat(SMALLEST_RATIO, v))
+    of_c = where_larger(ratio, splat(0.0, v), of_c, splat(0.0, v))
     return (
         of_c * (dilatation - _sum_and_product(a.x, a.x, a, a)) + s,
         of_c * (dilatation - _sum_and_product(b.y, b.y, b, b)) + s,
         of_c * (dilatation - _sum_and_product(d.z, d.z, d, d)) + s,
-        alike(-1.0, v) * of_c * _sum_and_product(b.z, d.y, b, d),
-        alike(-1.0, v) * of_c * _sum_and_product(a.z, d.x, a, d),
-        alike(-1.0, v) * of_c * _sum_and_product(a.y, b.x, a, b),
+        splat(-1.0, v) * of_c * _sum_and_product(b.z, d.y, b, d),
+        splat(-1.0, v) * of_c * _sum_and_product(a.z, d.x, a, d),
+        splat(-1.0, v) * of_c * _sum_and_product(a.y, b.x, a, b),
         pressure_of(solid, block, v),
     )
 

@@ -123,13 +123,13 @@ def uniform_records(
     if n_left == 0:
         return flat[:0].reshape(0, 1)
     records = flat[start : start + n_left * stride].reshape(n_left, stride)
-    n_alike, n_tried = 0, 64
-    while n_alike < n_left:  # in pieces that grow, so that many short runs cost little
-        piece = records[n_alike : n_alike + n_tried]
-        alike = (piece[:, columns] == records[0, columns]).all(axis=1)
-        if not alike.all():
-            return records[: n_alike + int(np.argmin(alike))]
-        n_alike, n_tried = n_alike + len(piece), 4 * n_tried
+    n_equal, n_tried = 0, 64
+    while n_equal < n_left:  # in pieces that grow, so that many short runs cost little
+        piece = records[n_equal : n_equal + n_tried]
+        equal = (piece[:, columns] == records[0, columns]).all(axis=1)
+        if not equal.all():
+            return records[: n_equal + int(np.argmin(equal))]
+        n_equal, n_tried = n_equal + len(piece), 4 * n_tried
     return records
 
 

@@ -21,7 +21,7 @@ import math
 
 from tissue.core.jit import inlined
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import alike, logarithm
+from tissue.core.simd_blocks import logarithm, splat
 from tissue.core.simd_rows import larger, where_larger
 from tissue.core.vec3 import Vec3, dot
 from tissue.laws.energy_density import EnergyDensity
@@ -72,24 +72,24 @@ def stretch_invariant(x: Vec3, y: Vec3, z: Vec3, cx: Vec3, cy: Vec3, cz: Vec3) -
 @inlined
 def stiffening_factor(law: EnergyDensity, q: Lanes) -> Lanes:
     """Return g = w'(q), the shear modulus over that at rest."""
-    one, positive = alike(1.0, q), larger(q, alike(0.0, q))
+    one, positive = splat(1.0, q), larger(q, splat(0.0, q))
     if law.exponent > 0.0:
         return one + exponential_less_one(_exponent(law, positive))
-    second, third = alike(2.0 * law.second, q), alike(3.0 * law.third, q)
+    second, third = splat(2.0 * law.second, q), splat(3.0 * law.third, q)
     return one + positive * (second + third * positive)
 
 
 @inlined
 def stretch_energy(law: EnergyDensity, q: Lanes) -> Lanes:
     """Return w(q)."""
-    positive = larger(q, alike(0.0, q))
+    positive = larger(q, splat(0.0, q))
     if law.exponent > 0.0:
-        b = alike(law.exponent, q)
+        b = splat(law.exponent, q)
         x = _exponent(law, positive)
         grown = exponential_less_one(x)
         # Beyond the largest exponent, and where q is negative, w goes on along its tangent.
-        return (grown + (grown + alike(1.0, q)) * (b * q - x)) / b
-    second, third = alike(law.second, q), alike(law.third, q)
+        return (grown + (grown + splat(1.0, q)) * (b * q - x)) / b
+    second, third = splat(law.second, q), splat(law.third, q)
     return q + positive * positive * (second + third * positive)
 
 
@@ -113,14 +113,14 @@ def _stretch_of_exponential(law: EnergyDensity, y: Lanes) -> Lanes:
 
     From the left Newton's method stays there. Beyond `LARGEST_EXPONENT` g is constant.
     """
-    one, two, b = alike(1.0, y), alike(2.0, y), alike(law.exponent, y)
-    by = b * (y + alike(_NO_STRESS, y))
+    one, two, b = splat(1.0, y), splat(2.0, y), splat(law.exponent, y)
+    by = b * (y + splat(_NO_STRESS, y))
     goal = logarithm(by)
     u = by / (one + two * by)
     for _ in range(_NEWTON_STEPS_EXPONENTIAL):
         u = u - u * (two * u + logarithm(u) - goal) / (two * u + one)
     factor = math.exp(2.0 * LARGEST_EXPONENT)
-    u = where_larger(by, alike(LARGEST_EXPONENT * factor, y), alike(1.0 / factor, y) * by, u)
+    u = where_larger(by, splat(LARGEST_EXPONENT * factor, y), splat(1.0 / factor, y) * by, u)
     return u / b
 
 
@@ -138,31 +138,31 @@ def _stretch_of_yeoh(law: EnergyDensity, y: Lanes) -> Lanes:
 @inlined
 def stiffening_slope(law: EnergyDensity, q: Lanes, g: Lanes) -> Lanes:
     """Return g' = w''(q), given g; 0 where q is negative or the law stiffens no more."""
-    zero = alike(0.0, q)
+    zero = splat(0.0, q)
     if law.exponent > 0.0:
-        b = alike(law.exponent, q)
-        slope = where_larger(alike(LARGEST_EXPONENT, q), b * q, b * g, zero)
+        b = splat(law.exponent, q)
+        slope = where_larger(splat(LARGEST_EXPONENT, q), b * q, b * g, zero)
     else:
-        slope = alike(2.0 * law.second, q) + alike(6.0 * law.third, q) * q
+        slope = splat(2.0 * law.second, q) + splat(6.0 * law.third, q) * q
     return where_larger(q, zero, slope, zero)
 
 
 @inlined
 def _exponent(law: EnergyDensity, positive: Lanes) -> Lanes:
     """Return b q, at most `LARGEST_EXPONENT`."""
-    x = alike(law.exponent, positive) * positive
-    over = larger(x - alike(LARGEST_EXPONENT, x), alike(0.0, x))
+    x = splat(law.exponent, positive) * positive
+    over = larger(x - splat(LARGEST_EXPONENT, x), splat(0.0, x))
     return x - over
 
 
 @inlined
 def exponential_less_one(x: Lanes) -> Lanes:
     """Return exp(x) - 1 for x from 0 to `LARGEST_EXPONENT`, without loss where x is small."""
-    y = alike(0.5**_HALVINGS, x) * x
-    e = alike(1.0 / _FACTORIALS[0], x)
+    y = splat(0.5**_HALVINGS, x) * x
+    e = splat(1.0 / _FACTORIALS[0], x)
     for factorial in _FACTORIALS[1:]:
-        e = e * y + alike(1.0 / factorial, x)
+        e = e * y + splat(1.0 / factorial, x)
     e = e * y
     for _ in range(_HALVINGS):
-        e = e * (e + alike(2.0, x))
+        e = e * (e + splat(2.0, x))
     return e

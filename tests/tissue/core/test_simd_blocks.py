@@ -6,12 +6,12 @@ import pytest
 from tissue.core.jit import kernel
 from tissue.core.simd import aligned, point, store_point
 from tissue.core.simd_blocks import (
-    alike,
-    gathered_alike,
+    gathered_like,
     load_block,
     logarithm,
     points_of_rows,
     row_of_lane,
+    splat,
     store_block,
     store_everywhere,
     store_row,
@@ -57,8 +57,8 @@ def both(function, *arguments, out):
 def arithmetic(values, out):
     width = width_of(values)
     a, b = load_block(values, 0), load_block(values, width)
-    store_block(out, 0, (a + b) * alike(3.0, a))
-    store_block(out, width, where_larger(a, b, a / b, larger(a, alike(1.0, a)) - b))
+    store_block(out, 0, (a + b) * splat(3.0, a))
+    store_block(out, width, where_larger(a, b, a / b, larger(a, splat(1.0, a)) - b))
 
 
 @pytest.mark.kernel
@@ -86,7 +86,7 @@ def test_a_block_is_folded_to_a_double(real):
 
 def converted(values, doubles, of, out):
     a = load_block(values, 0)
-    store_block(out, 0, gathered_alike(a, doubles, of, 0) * a)
+    store_block(out, 0, gathered_like(a, doubles, of, 0) * a)
 
 
 @pytest.mark.kernel

@@ -13,7 +13,7 @@ import math
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import alike, gathered_alike, load_block, store_block, width_of
+from tissue.core.simd_blocks import gathered_like, load_block, splat, store_block, width_of
 from tissue.core.simd_rows import any_above, larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, cross, dot
 from tissue.elasticity.finite_elements import Solid, n_blocks
@@ -52,8 +52,8 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
         x, y, z = _gradient(solid, block, is_known)
         place = width_of(solid.shape) * (1 + block)
         room = load_block(solid.inverse_bound, place)
-        room = alike(allowed, room) * room
-        one, least = alike(1.0, room), alike(UNNOTICED, room)
+        room = splat(allowed, room) * room
+        one, least = splat(1.0, room), splat(UNNOTICED, room)
         # Where the bound at rest is above the limit, any growth counts.
         least = where_larger(one, room, room, least)
         if stiffens(law):
@@ -91,15 +91,15 @@ def quick_bounds(elastic: Elastic, block: int, is_known: bool) -> float:
     largest_growth = growth
     if stiffens(law):
         stiffness = load_block(solid.stiffness, place)
-        bound = bound + larger(stiffness - growth, alike(0.0, growth)) * _highest_at_rest(
+        bound = bound + larger(stiffness - growth, splat(0.0, growth)) * _highest_at_rest(
             solid.shear_frequency_squared, solid, block, growth
         )
         further = larger(further, stiffness / load_block(solid.tested_stiffness, place))
         largest_growth = larger(growth, stiffness)
-    bound = where_larger(largest_growth, alike(UNNOTICED, growth), bound, at_rest)
+    bound = where_larger(largest_growth, splat(UNNOTICED, growth), bound, at_rest)
     found = load_block(solid.tested_bound, place)
-    grown = larger(further, alike(1.0, growth)) * found
-    grown = where_larger(found, alike(0.0, growth), grown, bound)
+    grown = larger(further, splat(1.0, growth)) * found
+    grown = where_larger(found, splat(0.0, growth), grown, bound)
     bound = where_larger(bound, grown, grown, bound)
     store_block(solid.growth, place, growth)
     store_block(solid.strained_bound, place, bound)
@@ -121,12 +121,12 @@ def _highest_at_rest(values: FloatArray, solid: Solid, block: int, a: Lanes) -> 
     first = 4 * width * block
     return larger(
         larger(
-            gathered_alike(a, values, nodes, first),
-            gathered_alike(a, values, nodes, first + width),
+            gathered_like(a, values, nodes, first),
+            gathered_like(a, values, nodes, first + width),
         ),
         larger(
-            gathered_alike(a, values, nodes, first + 2 * width),
-            gathered_alike(a, values, nodes, first + 3 * width),
+            gathered_like(a, values, nodes, first + 2 * width),
+            gathered_like(a, values, nodes, first + 3 * width),
         ),
     )
 
@@ -134,7 +134,7 @@ def _highest_at_rest(values: FloatArray, solid: Solid, block: int, a: Lanes) -> 
 @inlined
 def _cofactors(x: Vec3, y: Vec3, z: Vec3) -> tuple[Vec3, Vec3, Vec3]:
     """Return the rows of cof F from the rows of H."""
-    one = alike(1.0, x.x)
+    one = splat(1.0, x.x)
     f1, f2, f3 = Vec3(x.x + one, x.y, x.z), Vec3(y.x, y.y + one, y.z), Vec3(z.x, z.y, z.z + one)
     return cross(f2, f3), cross(f3, f1), cross(f1, f2)
 
@@ -150,7 +150,7 @@ def _growth(solid: Solid, block: int, cofactors: tuple[Vec3, Vec3, Vec3]) -> Lan
         larger(_square(cofactors, g1) / dot(g1, g1), _square(cofactors, g2) / dot(g2, g2)),
         larger(_square(cofactors, g3) / dot(g3, g3), _square(cofactors, g0) / dot(g0, g0)),
     )
-    return larger(growth, alike(1.0, growth))
+    return larger(growth, splat(1.0, growth))
 
 
 @inlined
@@ -169,7 +169,7 @@ def _grows_further(
             _square(cofactors, g0) - room * dot(g0, g0),
         ),
     )
-    return any_above(excess, alike(0.0, excess))
+    return any_above(excess, splat(0.0, excess))
 
 
 @inlined
@@ -192,7 +192,7 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lan
     """
     trace = x.x + y.y + z.z
     cx, cy, cz = cross(y, z), cross(z, x), cross(x, y)
-    two = alike(2.0, trace)
+    two = splat(2.0, trace)
     # The rows of H - K, K = (tr H) 1 - H^T + cof H:
     ax = Vec3(two * x.x - trace - cx.x, x.y + y.x - cx.y, x.z + z.x - cx.z)
     ay = Vec3(y.x + x.y - cy.x, two * y.y - trace - cy.y, y.z + z.y - cy.z)
