@@ -32,7 +32,7 @@ BlockCells = tuple[int, int, int]
 CELL = 0.01
 """Side of a cell [m]."""
 JITTER = 0.1
-"""Largest displacement of an inner node from the grid, in cells: no two tetrahedra are alike, as in
+"""Largest displacement of an inner node from the grid, in cells: no two tetrahedra are equal, as in
 an organ."""
 SEED = 1998
 """Seed of the jitter: every run measures the same blocks."""

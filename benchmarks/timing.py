@@ -1,4 +1,4 @@
-"""The timer: cases take turns in rounds, so that a disturbance of the machine affects all alike."""
+"""The timer: cases take turns in rounds, so that disturbances of the machine affect all equally."""
 
 from collections.abc import Callable, Sequence
 from typing import Annotated, NamedTuple

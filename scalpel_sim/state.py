@@ -52,7 +52,7 @@ _RULES = StateRules(
 """Rules of the state of arm and bridge; the tissue has its own."""
 
 _CONTENT, _ARM, _WHERE = "simulation", "arm", "places"
-"""Names of arrays beside the tissue's in the bytes of a state: JSON, MuJoCo's state, `_PLACES`."""
+"""Names of arrays besides the tissue's in the bytes of a state: JSON, MuJoCo's state, `_PLACES`."""
 
 
 class SavedSimulation(Protocol):
@@ -155,7 +155,7 @@ class SimulationState:
 
         Raises:
             StateError: it is of another simulation, or that has recorded less; from bytes: it is of
-                one that was not made alike. The simulation is as it was.
+                one that was not made the same way. The simulation is as it was.
         """
         source = self._source
         if isinstance(source, Memento) and source.root is not simulation:
@@ -283,7 +283,7 @@ def _expect_compatible(simulation: SavedSimulation, settings: Mapping[str, str])
     if names:
         raise StateError(
             f"the state is of another simulation: what differs is {', '.join(names)}. Load it "
-            "into one that was made alike"
+            "into one that was made the same way"
         )
 
 

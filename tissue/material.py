@@ -97,7 +97,7 @@ class Material:
     poisson_ratio: float = 0.45
     """Transverse contraction over extension. Springs alone have 1/4; for more each tetrahedron also
     resists a change of its volume, and less is impossible with springs. Soft tissue is mostly water
-    and hardly compressible: 0.45 to 0.49."""
+    and barely compressible: 0.45 to 0.49."""
     stiffening: InitVar[float | None] = None
     """`Exponential.b`, where the law is given by name; read it from the law. So the next three."""
     yeoh_second: InitVar[float | None] = None
@@ -247,7 +247,7 @@ class Material:
 
         A ratio of 1 is critical: the body returns without oscillating. Choose the body's first
         bending mode for `frequency`. The loss tangent of soft tissue, twice the damping ratio,
-        hardly depends on frequency. Damping by viscosity rises with frequency, damping by drag
+        barely depends on frequency. Damping by viscosity rises with frequency, damping by drag
         falls; their sum is `ratio` at both ends of a band and less between them (Rayleigh).
 
         Args:
@@ -357,7 +357,7 @@ def checked_series(series: Iterable[Iterable[float]]) -> tuple[tuple[float, floa
     if not total < 1.0:
         raise ValueError(
             f"prony has g whose sum is {total:g}; it must be below 1, or nothing of the stress is "
-            "left at last"
+            "left finally"
         )
     return pairs
 

@@ -297,7 +297,7 @@ class SchemeStatistics(NamedTuple):
     """Split tetrahedra whose centre would have been flat or inverted, so that their face nodes were
     moved towards the centroids."""
     n_own_face_nodes: int
-    """Face nodes that the guard made for one tetrahedron, beside the node of its neighbour."""
+    """Face nodes that the guard made for one tetrahedron, besides the node of its neighbour."""
     n_unsupported: int
     """Tetrahedra that stayed whole because their cut edges are none of the 37 codes."""
     n_waiting: int

@@ -270,7 +270,7 @@ def _reach(model: mujoco.MjModel, joint: int, geoms: Sequence[int]) -> float:
 
 
 def _play(model: mujoco.MjModel, body: int) -> float:
-    """Return how far hinges beside it, and slides, can move a body's origin in its parent [m]."""
+    """Return how far hinges next to it, and slides, can move a body's origin in its parent [m]."""
     first = int(model.body_jntadr[body])
     joints = range(first, first + int(model.body_jntnum[body]))
     return sum(

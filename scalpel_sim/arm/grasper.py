@@ -1,4 +1,4 @@
-"""A surgical grasper: two jaws on a shaft, and the arm that holds it beside another arm."""
+"""A surgical grasper: two jaws on a shaft, and the arm that holds it next to another arm."""
 
 from pathlib import Path
 from typing import NamedTuple

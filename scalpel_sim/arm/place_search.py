@@ -291,8 +291,8 @@ def _scores(
 def base_of(path: InstrumentPath, places: Places) -> FloatArray:
     """Return where the base stands, tissue frame [m], shape (n_places, 3)."""
     outward = _turns(places.yaws)[:, :, 1]
-    beside = _middle(path) - places.distances[:, None] * outward
-    return np.asarray(beside - np.multiply.outer(places.heights, [0.0, 0.0, 1.0]))
+    adjacent = _middle(path) - places.distances[:, None] * outward
+    return np.asarray(adjacent - np.multiply.outer(places.heights, [0.0, 0.0, 1.0]))
 
 
 def in_base(path: InstrumentPath, places: Places) -> tuple[FloatArray, FloatArray]:

@@ -52,7 +52,7 @@ class PlacementError(UsageError):
 
 
 class Neighbours(NamedTuple):
-    """What an arm with a grasper stands beside, tissue frame."""
+    """What an arm with a grasper stands next to, tissue frame."""
 
     boxes: FloatArray
     """Lowest and highest corners of what lies there [m], shape (2, 3) or (n, 2, 3): see `place`."""
@@ -113,7 +113,7 @@ def place(
     Args:
         stroke: In the tissue frame.
         boxes: Lowest and highest corners of what lies there, tissue frame [m], shape (2, 3) or
-            (n, 2, 3): of the tissue, and of the board under it. The base stands beside them, and
+            (n, 2, 3): of the tissue, and of the board under it. The base stands next to them, and
             they lie above the table that it stands on.
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches, and renders the force.
         force: Expected force on the blade [N], toughness times the length of edge in the tissue. It
@@ -196,7 +196,7 @@ def place_beside(
         stroke: The motion of the grasper, as that of an edge from where the arm holds it to the end
             of its pads; tissue frame.
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches.
-        beside: What it stands beside.
+        beside: What it stands next to.
         at_start: Whether the arms are to be clear of each other at the first instant alone.
 
     Raises:
@@ -223,7 +223,7 @@ def place_beside(
     extent = 1e3 * np.ptp(path.positions, axis=0)
     raise PlacementError(
         f"the {name} arm does not reach the whole {stroke.name}, over {extent[0]:.0f} x "
-        f"{extent[1]:.0f} x {extent[2]:.0f} mm (x, y, z), from any place beside the tissue. Turn "
+        f"{extent[1]:.0f} x {extent[2]:.0f} mm (x, y, z), from any place next to the tissue. Turn "
         "its approach, or move it closer together"
     )
 

@@ -20,7 +20,7 @@ NEAR_ENOUGH = 1e-3
 """How near the side of a box comes to where the reach of the arm ends [m]."""
 
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1))
-"""Corners of a box in an order in which each is beside the next: 0 is low, 1 is high."""
+"""Corners of a box in an order in which each is next to the next: 0 is low, 1 is high."""
 
 
 def reachable_part(

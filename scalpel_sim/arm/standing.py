@@ -16,7 +16,7 @@ from scalpel_sim.arm.free_names import free_prefix
 from tissue import FloatArray, Geom
 
 STANDING = 1 << 16
-"""Bit of `contype` of what stands beside arms."""
+"""Bit of `contype` of what stands next to arms."""
 
 ARM_GROUPS = tuple(1 << bit for bit in range(17, 31))
 """Bits of `contype` of arms, one each."""

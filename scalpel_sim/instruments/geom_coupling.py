@@ -108,7 +108,7 @@ class GeomCoupling:
         self._contact.move(self._poses)
 
     def apply(self) -> None:
-        """Apply the forces of the last step to the bodies, beside what others apply to them.
+        """Apply the forces of the last step to the bodies, besides what others apply to them.
 
         Raises:
             GeomCouplingError: a wrench is not finite, or too large; see `body_wrench`. Those of the

@@ -108,7 +108,7 @@ class Grip:
         self.attachment.move(frame.points_to_tissue(body.position), rotation)
 
     def apply(self) -> None:
-        """Apply the wrench of the last step to the body, beside what others apply to it.
+        """Apply the wrench of the last step to the body, besides what others apply to it.
 
         Raises:
             GripError: the wrench is not finite, or too large; see `body_wrench`. The one of the

@@ -29,7 +29,7 @@ _CUTOFF: Final = 1e-3
 """Singular value, over the largest, below which joints are not asked for a motion in it."""
 _FARTHER: Final = (0.0, 1e-3, 5e-3, 0.02, 0.05)
 """How far beyond the border of reach poses are moved [m], one after the other: at the border, where
-an arm is stretched, the search for a configuration may end just beside it."""
+an arm is stretched, the search for a configuration may end just next to it."""
 _DECIMALS: Final = 4
 """Decimals of a place that a message gives [m]: a fifth of `NEAR_PLACE`."""
 

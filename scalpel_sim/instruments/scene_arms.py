@@ -38,7 +38,7 @@ The larger of the arms reaches it around every body of the scenes whose blade st
 
 ROOM_OF_GRASPER = 0.06
 """Room around the body for the tip of a grasper [m]: enough to lift what it holds, and to lay it
-down beside the body."""
+down next to the body."""
 
 
 class ArmSurroundings(NamedTuple):
@@ -75,7 +75,7 @@ def project_arm_in(
     around: ArmSurroundings,
     needed: ExpectedForce,
 ) -> StandingArms:
-    """Return an arm of the project where it reaches, and what stands beside it.
+    """Return an arm of the project where it reaches, and what stands next to it.
 
     Args:
         scene: The scene.
@@ -132,7 +132,7 @@ def own_arm_in(
     motions: Sequence[GraspMotion],
     around: ArmSurroundings,
 ) -> StandingArms:
-    """Return the arm of the user's own at the start, and what stands beside it.
+    """Return the arm of the user's own at the start, and what stands next to it.
 
     Args:
         scene: The scene, which says where its tissue lies.
@@ -220,14 +220,14 @@ def workspace_in(
 ) -> FloatArray:
     """Return the lowest and the highest place of the middle of the edge [m], shape (2, 3).
 
-    There the tip is in the body of the scene, or a little beside or above it, with the edge as at
+    There the tip is in the body of the scene, or a little next to or above it, with the edge as at
     the start, and not under its table or floor; the start lies in it wherever it is.
 
     Args:
         scene: The scene.
         start: The pose of the blade at the start, tissue frame; of a grasper, its pads as an edge.
         bounds: Lowest and highest corner of the body [m], shape (2, 3).
-        room: How far the tip may be beside the body or above it [m].
+        room: How far the tip may be next to the body or above it [m].
     """
     low, high = bounds[0] - room, bounds[1] + room
     low[2] = max(low[2], scene.world.stop)

@@ -139,7 +139,7 @@ def place_of_grasper(
     Args:
         motion: Where the grasper goes; of a hand, where it starts.
         preset: The arm.
-        beside: What it stands beside.
+        beside: What it stands next to.
         workspace: Where a hand is to lead it, see `HeldArm.workspace`; None: it follows its script.
 
     Raises:

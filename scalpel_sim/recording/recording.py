@@ -115,7 +115,7 @@ class Recording:
         return self._columns(slice(at, at + 1))[:, 0]
 
     def vector(self, name: str) -> FloatArray:
-        """Return the three columns of a vector such as `tip`, shape (n_frames, 3), alike."""
+        """Return the three columns of a vector such as `tip`, shape (n_frames, 3), likewise."""
         return self._columns(self._place_of(name))
 
     def sizes(self, name: str) -> FloatArray:

@@ -12,7 +12,7 @@ STROKE = "stroke.csv"
 """What a hand did with the blade. A scripted run leaves it, and the files of graspers: they may be
 the very ones that are done again."""
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
-"""Names of all files that a run can write, beside `STROKE`."""
+"""Names of all files that a run can write, besides `STROKE`."""
 
 REPLAY_FRAMES = "replay.part"
 """The frames of the replay, while the run goes on."""

@@ -1,6 +1,6 @@
 """What a stroke is asked to cut: the area, in the body at rest, and how many pieces it leaves.
 
-Areas are counted as areas of cuts are; pieces are joined beside the sheet that the edge sweeps.
+Areas are counted as areas of cuts are; pieces are joined next to the sheet that the edge sweeps.
 """
 
 import itertools

@@ -35,7 +35,7 @@ class PlannedSheet(NamedTuple):
     def bulge(self, along: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return height [m] and slope of the sheet over its plane, at lengths `along` the motion.
 
-        The height is counted from the middle of the bend, so that it spares both sides alike.
+        The height is counted from the middle of the bend, so that it spares both sides equally.
         """
         phase = np.pi * np.clip(along / self.chord, -0.5, 0.5)
         slope = -np.pi * self.sagitta / self.chord * np.sin(phase)

@@ -40,7 +40,7 @@ _DOTS_PER_INCH = 100
 _MOST_MARKERS = 12
 """Curves of no more points than this are drawn as points."""
 _MOST_INSIDE = 5
-"""A legend of more entries than this stands beside the plot."""
+"""A legend of more entries than this stands next to the plot."""
 
 
 class SceneRun(NamedTuple):

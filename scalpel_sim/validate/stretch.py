@@ -105,7 +105,7 @@ def uniaxial(material: Material, stretches: FloatArray) -> UniaxialStretch:
 def stretched_bar(material: Material, longest: float = _LONGEST) -> UniaxialStretch:
     """Stretch a bar in ten equal parts; return its force and the width of its middle after each.
 
-    Its ends are made as narrow as the theory says, so that all of it is stretched alike if the
+    Its ends are made as narrow as the theory says, so that all of it is stretched equally if the
     engine agrees. The rest of its width is free.
 
     Args:

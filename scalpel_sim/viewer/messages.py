@@ -82,7 +82,7 @@ class SceneState(NamedTuple):
     body_poses: FloatArray
     """Poses of all bodies of the MuJoCo model, see `model_shapes.body_poses`."""
     readings: Readings | None = None
-    """Numbers to show beside the picture."""
+    """Numbers to show next to the picture."""
     live: LiveState | None = None
     """How the run is, if the page controls it."""
     values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES

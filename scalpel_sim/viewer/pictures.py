@@ -19,7 +19,7 @@ from tissue import SurfaceQuantity
 
 
 def readings(simulation: Simulation) -> Readings:
-    """Return the numbers to show beside the picture."""
+    """Return the numbers to show next to the picture."""
     wrench, result, frame = simulation.wrench, simulation.bridge.result, simulation.frame
     if result is None:  # before the first frame
         n_tetrahedra = simulation.link.describe().n_tetrahedra

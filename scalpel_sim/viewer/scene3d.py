@@ -3,7 +3,7 @@
 Objects have paths, as in meshcat, and are sent as meshcat's commands (`set_object`,
 `set_transform`). The page that shows them (`page/`) adds commands that meshcat lacks: textured
 materials that many meshes share, several commands that take effect together, a camera and lights
-that suit the size of the scene, and readings beside the picture.
+that suit the size of the scene, and readings next to the picture.
 
 meshcat's viewer and its command format are used, but not its Python package: importing it takes
 0.4 s (it imports IPython), and its server listens on all interfaces, keeps every property that was
@@ -48,7 +48,7 @@ NO_VECTORS = np.zeros((0, 3))
 
 
 class Readings(NamedTuple):
-    """Numbers that are shown beside the picture, and forces that are drawn in it."""
+    """Numbers that are shown next to the picture, and forces that are drawn in it."""
 
     time: float
     """Simulated time [s]."""

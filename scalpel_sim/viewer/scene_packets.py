@@ -80,7 +80,7 @@ _STEEL = {
 _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
 """Properties of the material of painted parts."""
 
-OWN_VIEW = "beside the arms"
+OWN_VIEW = "next to the arms"
 """Name of the page's own camera; a scene that has a view of this name replaces it."""
 
 HIGHEST_LEVEL = 255
@@ -108,7 +108,7 @@ class ScenePackets:
             shapes: Visible shapes of the MuJoCo model, from `model_shapes.shapes_of`.
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
-            views: Cameras that the page offers beside its own; it begins with the first.
+            views: Cameras that the page offers besides its own; it begins with the first.
         """
         self._shapes = list(shapes)
         self._frame = frame or TissueFrame()
@@ -186,7 +186,7 @@ class ScenePackets:
         return [body_poses[sorted(arm), :2].mean(axis=0) for arm in bodies.values()]
 
     def _eye(self, centre: FloatArray, body_poses: FloatArray) -> FloatArray:
-        """Return the camera's position [m]: above, and beside the lines from the body to arms."""
+        """Return the camera's position [m]: above, and next to the lines from the body to arms."""
         axis = self._frame.rotation[:, 0]
         azimuths = np.arctan2(axis[1], axis[0]) + CAMERA_AZIMUTHS
         level = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)

@@ -155,7 +155,7 @@ class Viewer:
         Args:
             surface: Surface of the body, tissue frame. Kept, not copied.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
-            readings: Numbers to show beside the picture.
+            readings: Numbers to show next to the picture.
             live: How the run is, if the page controls it.
             values: The quantities `wanted`, at the vertices of the surface, SI.
         """

@@ -189,7 +189,7 @@ class BladeState(Arrays):
     totals: ImpulseTotals
     """Impulses and works."""
     reach: float
-    """Distance up to which a sample is anchored beside another one; and up to which a blade that
+    """Distance up to which a sample is anchored next to another one; and up to which a blade that
     backed off still belongs to its anchor [m]."""
     queue: IntArray
     """Scratch for searches, shape (LARGEST_STAR,)."""

@@ -59,11 +59,11 @@ def rotation_of_sheet(sheets: BodySheets, k: int) -> Matrix3:
 
 
 @kernel
-def join_sheet(sheets: BodySheets, k: int, beside: int) -> None:
-    """Put sample `k`, which holds or is placed with it, in the sheet of sample `beside`."""
-    sheets.first[k] = sheets.first[beside]
+def join_sheet(sheets: BodySheets, k: int, adjacent: int) -> None:
+    """Put sample `k`, which holds or is placed with it, in the sheet of sample `adjacent`."""
+    sheets.first[k] = sheets.first[adjacent]
     for i in range(9):
-        sheets.rotation[k, i] = sheets.rotation[beside, i]
+        sheets.rotation[k, i] = sheets.rotation[adjacent, i]
 
 
 @kernel

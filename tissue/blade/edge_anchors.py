@@ -68,7 +68,7 @@ class Anchors(Arrays):
     offset: FloatArray
     """Distance along the normal of the blade by which the edge has moved aside of the anchor while
     it was behind it [m], shape (n,): the plastic part of the stretch across the blade. Else an edge
-    that comes back beside where it cut would pull at once, with energy out of nothing."""
+    that comes back next to where it cut would pull at once, with energy out of nothing."""
     stretch: FloatArray
     """Vector from the anchor to the point that pulled on it where its account began
     (`begin_account`) [m], shape (n, 3)."""
@@ -170,7 +170,7 @@ def anchor_position(anchors: Anchors, body: Body, positions: FloatArray, k: int)
 
 @kernel
 def pulling_point(anchors: Anchors, pose: BladePose, k: int) -> Vec3:
-    """Return the point of the blade that pulls on anchor `k` [m]: its sample, or beside that."""
+    """Return the point of the blade that pulls on anchor `k` [m]: its sample, or next to that."""
     b = sample_point(pose, k, len(anchors.state))
     offset = anchors.offset[k]
     if offset == 0.0:

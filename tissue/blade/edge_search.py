@@ -1,6 +1,6 @@
 """Which samples of the edge are anchored, and which are free.
 
-A free sample that enters the tissue is anchored where it is. A free sample beside an anchored one
+A free sample that enters the tissue is anchored where it is. A free sample next to an anchored one
 is anchored as far behind the blade as its neighbour. In an existing slit neither is: nothing is
 left to cut there. A sample that backed off and then went elsewhere is freed.
 """
@@ -38,7 +38,7 @@ from tissue.mesh.tetrahedron_grid import TetrahedronGrid
 
 _BESIDE = 0.7
 """Cosine of the angle between the blade's normal and the direction to the nearest cut face, from
-which the point is beside that face, in the slit. Below, it is ahead of the rim, or under the
+which the point is next to that face, in the slit. Below, it is ahead of the rim, or under the
 bottom."""
 
 
@@ -49,7 +49,7 @@ def free_retracted(
     """Free the samples that backed off and then went elsewhere: into tissue not cut yet.
 
     A blade that backs off, goes deeper and then forward again cuts below its old slit: the path of
-    its samples begins again. The path of a sample beside an anchored one goes on from where it was,
+    its samples begins again. The path of a sample next to an anchored one continues where it was,
     or the tissue between would stay whole.
 
     Args:
@@ -92,7 +92,7 @@ def _is_beside_anchored(anchors: Anchors, k: int) -> bool:
 def anchor_beside(
     blade: BladeState, body: Body, visits: Visits, pose: BladePose, slit_reach: float
 ) -> None:
-    """Anchor the free samples beside an anchored one that are in the tissue too.
+    """Anchor the free samples next to an anchored one that are in the tissue too.
 
     The anchors trail behind the blade by the same distance along the edge: a sample is in the
     tissue if the point that far behind it is. Tissue beyond `BladeState.reach` is not taken.
@@ -110,15 +110,15 @@ def anchor_beside(
     for direction in range(2):
         for i in range(n):
             k = i if direction == 0 else n - 1 - i
-            beside = k - 1 if direction == 0 else k + 1
-            if anchors.state[k] != FREE or not 0 <= beside < n:
+            adjacent = k - 1 if direction == 0 else k + 1
+            if anchors.state[k] != FREE or not 0 <= adjacent < n:
                 continue
-            if anchors.state[beside] != ANCHORED:
+            if anchors.state[adjacent] != ANCHORED:
                 continue
-            rotation = rotation_of_sheet(anchors.sheets, beside)
-            offset = rest_offset(pose, rotation, n, k, beside)
-            p = add(vec3(anchors.rest, beside), offset)
-            location = locate(body, visits, p, anchors.tetrahedron[beside], blade.queue)
+            rotation = rotation_of_sheet(anchors.sheets, adjacent)
+            offset = rest_offset(pose, rotation, n, k, adjacent)
+            p = add(vec3(anchors.rest, adjacent), offset)
+            location = locate(body, visits, p, anchors.tetrahedron[adjacent], blade.queue)
             if not location.inside:
                 continue
             t = location.tetrahedron
@@ -130,12 +130,12 @@ def anchor_beside(
             ahead = add(p, scale(slit_reach, apply_transposed(rotation, pose.forward)))
             if _runs_in_slit(blade, body, visits, pose, t, p, ahead, slit_reach):
                 continue
-            # Beside skin that is not broken it is skin too, else the edge broke in unopposed there.
-            _begin_anchor(anchors, body, k, t, p, anchors.at_skin[beside])
-            join_sheet(anchors.sheets, k, beside)
-            anchors.rest_share[k] = anchors.rest_share[beside]
-            store(anchors.rest_area, k, vec3(anchors.rest_area, beside))
-            anchors.offset[k] = anchors.offset[beside]
+            # Next to skin that is not broken it is skin too, or the edge broke in unopposed there.
+            _begin_anchor(anchors, body, k, t, p, anchors.at_skin[adjacent])
+            join_sheet(anchors.sheets, k, adjacent)
+            anchors.rest_share[k] = anchors.rest_share[adjacent]
+            store(anchors.rest_area, k, vec3(anchors.rest_area, adjacent))
+            anchors.offset[k] = anchors.offset[adjacent]
             stretch = sub(pulling_point(anchors, pose, k), here)
             begin_account(anchors, k, stretch, pose)
             if anchors.pulls[k]:
@@ -269,7 +269,7 @@ def _in_box(p: Vec3, low: Vec3, high: Vec3) -> bool:
 
 @kernel
 def is_in_slit(body: Body, t: int, p: Vec3, along: Vec3, forward: Vec3, reach: float) -> bool:
-    """Return whether a point of the body at rest is beside a cut face parallel to the blade.
+    """Return whether a point of the body at rest is next to a cut face parallel to the blade.
 
     A new cut so near to that face would be snapped to it: there is nothing left to cut, and no
     tissue ahead that resists.

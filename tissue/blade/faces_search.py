@@ -27,7 +27,7 @@ from tissue.mesh.body import Body, is_open
 from tissue.mesh.tetrahedron_grid import TETRAHEDRA_PER_LINE, TetrahedronGrid, cell_along
 
 LEAST_COSINE = 0.5
-"""Least cosine of the angle between the normals of blade and face for a face that is beside the
+"""Least cosine of the angle between the normals of blade and face for a face that is next to the
 blade. Other faces, such as the skin that the edge goes through, are pressed by the edge. With 0.05
 that skin, once tilted by three degrees, was pressed aside whole: the force on a blade rose by a
 third to a half while it went in."""
@@ -233,7 +233,7 @@ def _move_row(sides: FaceContacts, i: int, j: int) -> None:
 def _near_plane(sides: FaceContacts, x: FloatArray, pose: BladePose, i: int) -> int:
     """Return a bit for each of eight faces from `i` on: whether it may be near the blade's plane.
 
-    A blade is thin: most faces are beside it.
+    A blade is thin: most faces are next to it.
     """
     first = _across(sides, x, pose, i, 0)
     second = _across(sides, x, pose, i, 1)

@@ -54,7 +54,7 @@ def displacement_at_rest(
     sheared, one to each side. An anchor mostly is in one of them, and by that one alone would be
     led away from the cut, ever further: up to 0.6 mm in a block that is symmetric about it, where
     the force on the blade to that side was a third of that of the cut. Where the other lip has
-    parted already, the displacement goes straight on. Where the body ends beside the cut, as in a
+    parted already, the displacement goes straight on. Where the body ends next to the cut, as in a
     thin sheet that folds, the anchor's own tetrahedron decides.
 
     Args:
@@ -120,7 +120,7 @@ def find_sheets(anchors: Anchors, body: Body, apart: float) -> None:
 
 
 @kernel
-def rest_offset(pose: BladePose, rotation: Matrix3, n: int, k: int, beside: int) -> Vec3:
+def rest_offset(pose: BladePose, rotation: Matrix3, n: int, k: int, adjacent: int) -> Vec3:
     """Return the vector from one sample of the edge to another, in the body at rest [m].
 
     Args:
@@ -128,6 +128,8 @@ def rest_offset(pose: BladePose, rotation: Matrix3, n: int, k: int, beside: int)
         rotation: Rotation of the tissue there (see `find_sheets`).
         n: Number of samples.
         k: Sample at which the vector ends.
-        beside: Sample at which it begins.
+        adjacent: Sample at which it begins.
     """
-    return apply_transposed(rotation, sub(sample_point(pose, k, n), sample_point(pose, beside, n)))
+    return apply_transposed(
+        rotation, sub(sample_point(pose, k, n), sample_point(pose, adjacent, n))
+    )

@@ -214,52 +214,52 @@ def _place_beside(blade: BladeState, pose: BladePose, k: int, path: Path) -> Non
     """
     anchors, sheets = blade.anchors, blade.anchors.sheets
     n = len(anchors.state)
-    n_beside = 0
+    n_adjacent = 0
     p = Vec3(0.0, 0.0, 0.0)
     for distance in range(1, OUTREACH + 1):
-        for beside in range(k - distance, k + distance + 1, 2 * distance):
-            if not 0 <= beside < n or anchors.state[beside] == FREE:
+        for adjacent in range(k - distance, k + distance + 1, 2 * distance):
+            if not 0 <= adjacent < n or anchors.state[adjacent] == FREE:
                 continue
-            if n_beside == 1 and sheets.first[beside] != sheets.first[k]:
+            if n_adjacent == 1 and sheets.first[adjacent] != sheets.first[k]:
                 continue
-            n_beside += 1
-            join_sheet(sheets, k, beside)
-            offset = rest_offset(pose, rotation_of_sheet(sheets, beside), n, k, beside)
-            at = add(vec3(path.t1, beside), offset)
+            n_adjacent += 1
+            join_sheet(sheets, k, adjacent)
+            offset = rest_offset(pose, rotation_of_sheet(sheets, adjacent), n, k, adjacent)
+            at = add(vec3(path.t1, adjacent), offset)
             p = add(p, at)
-            if _is_elsewhere(path, k, beside, at, blade.reach):
+            if _is_elsewhere(path, k, adjacent, at, blade.reach):
                 path.known[k] = False
-        if n_beside > 0:
+        if n_adjacent > 0:
             path.member[k] = True
-            store(path.t1, k, scale(1.0 / n_beside, p))
+            store(path.t1, k, scale(1.0 / n_adjacent, p))
             store(path.forward, k, vec3(path.forward, sheets.first[k]))
             store(path.sideways, k, vec3(path.sideways, sheets.first[k]))
             return
 
 
 @kernel
-def _is_elsewhere(path: Path, k: int, beside: int, p: Vec3, reach: float) -> bool:
+def _is_elsewhere(path: Path, k: int, adjacent: int, p: Vec3, reach: float) -> bool:
     """Return whether a free sample was with another sheet than the one that it is placed with now.
 
-    It is where it was not near the sample that it is placed beside.
+    It is where it was not near the sample that it is placed next to.
 
     Args:
-        path: With the step of sample `beside`.
+        path: With the step of sample `adjacent`.
         k: The sample that is placed.
-        beside: The sample that it is placed beside.
+        adjacent: The sample that it is placed next to.
         p: Where it is placed [m].
         reach: `BladeState.reach` [m].
     """
     allowed = LONGEST_JUMP * reach
-    if not path.known[beside]:
+    if not path.known[adjacent]:
         return norm(sub(p, vec3(path.t0, k))) > allowed
-    before = norm(sub(vec3(path.t0, k), vec3(path.t0, beside)))
-    return before > norm(sub(p, vec3(path.t1, beside))) + allowed
+    before = norm(sub(vec3(path.t0, k), vec3(path.t0, adjacent)))
+    return before > norm(sub(p, vec3(path.t1, adjacent))) + allowed
 
 
 @kernel
 def _link(path: Path, longest: float) -> None:
-    """Link the samples beside each other that are so at rest too, to at most `longest` [m]."""
+    """Link the samples next to each other that are so at rest too, to at most `longest` [m]."""
     n = len(path.member)
     for k in range(n):
         path.linked[k] = (
@@ -272,7 +272,7 @@ def _link(path: Path, longest: float) -> None:
 
 @kernel
 def _smooth(path: Path) -> None:
-    """Smooth how far samples beside each other lie sideways, over about a node size.
+    """Smooth how far samples next to each other lie sideways, over about a node size.
 
     Anchors in different tetrahedra are dragged sideways by different amounts. The mesh cannot hold
     a fold of the cut surface that is finer than its tetrahedra; it would tear along one.
@@ -285,8 +285,8 @@ def _smooth(path: Path) -> None:
                     continue
                 here, sideways = vec3(path.t1, k), vec3(path.sideways, k)
                 distance = 0.0
-                for beside in range(k - 1, k + 2, 2):
-                    distance += dot(sub(vec3(path.t1, beside), here), sideways)
+                for adjacent in range(k - 1, k + 2, 2):
+                    distance += dot(sub(vec3(path.t1, adjacent), here), sideways)
                 store(path.t1, k, axpy(0.5 * distance / 2, sideways, here))
 
 

@@ -67,7 +67,7 @@ class _Origin(NamedTuple):
 
 
 class _Part(codegen.JITCodeLibrary):
-    """A kernel in LLVM's language, beside the parts that it calls."""
+    """A kernel in LLVM's language, next to the parts that it calls."""
 
     kind: ClassVar[str] = "part"
 

@@ -216,7 +216,7 @@ class Arrays:
         """
         raise TypeError(
             f"{type(self).__name__} holds addresses of memory, so that a Tissue can be neither "
-            "pickled nor copied; take Tissue.save_state(), which a Tissue made alike can load from "
+            "pickled nor copied; take Tissue.save_state(), which an equally made one can load from "
             "bytes"
         )
 

@@ -42,7 +42,7 @@ class Path(Arrays):
     """Direction in which the tip and the heel went last, averaged over a node size, shape (2, 3).
     It is shorter than 1 at first, and where the direction changes; 0 outside the tissue."""
     seed: IntArray = sized("samples", fill=-1)
-    """Tetrahedron at or beside each sample, or -1; shape (n,)."""
+    """Tetrahedron at or next to each sample, or -1; shape (n,)."""
     member: BoolArray = sized("samples")
     """Whether each sample is part of the chain at the end of the step, shape (n,)."""
     known: BoolArray = sized("samples")

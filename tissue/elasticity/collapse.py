@@ -295,7 +295,7 @@ def _frequency_at(collapsing: Collapsing, body: Body, shape: _Shape, t: int, q: 
 
 @kernel
 def _others(i: int, q: int) -> tuple[int, int]:
-    """Return the two corners of a tetrahedron beside two."""
+    """Return the two corners of a tetrahedron next to two."""
     first = 0
     while first in (i, q):
         first += 1

@@ -9,7 +9,7 @@ from the first Piola-Kirchhoff stress of the elastic law. r is apart from R sinc
 averaged around nodes: the elastic pressure of a tetrahedron does not follow from its own F, and as
 a part of R it was unstable.
 
-Forces need the sum over all terms, which is kept beside the terms.
+Forces need the sum over all terms, which is kept with the terms.
 """
 
 from tissue.core.array_types import FloatArray, IntArray

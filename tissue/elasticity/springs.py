@@ -187,12 +187,12 @@ def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> 
     """
     for i in range(n):
         node = nodes[i]
-        beside = 0.0
+        adjacent = 0.0
         for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
             other = springs.neighbour[slot]
             if not body.fixed[other]:
-                beside = max(beside, springs.stiffness_per_mass[other])
-        springs.frequency_squared[node] = springs.stiffness_per_mass[node] + beside
+                adjacent = max(adjacent, springs.stiffness_per_mass[other])
+        springs.frequency_squared[node] = springs.stiffness_per_mass[node] + adjacent
 
 
 @kernel

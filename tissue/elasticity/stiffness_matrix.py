@@ -5,7 +5,7 @@ rest, assembled with NumPy: force = -K displacement, exactly that of the engine'
 order (a test compares the two).
 
 Springs: K = sum of k u u^T, k by van Gelder. Change of volume: each node has the mean dilatation of
-the tetrahedra around it, by volume; beside springs, a share acts on each tetrahedron by itself
+the tetrahedra around it, by volume; besides springs, a share acts on each tetrahedron by itself
 (`OWN_SHARE`). Neo-Hookean law: shear of each tetrahedron by itself, and dilatation averaged over
 nodes (Smith, de Goes and Kim 2018; see `tissue.elasticity.neo_hookean`). Laws that stiffen: the
 same, but nothing is taken from the dilatation of a tetrahedron by itself.

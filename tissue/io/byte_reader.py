@@ -83,7 +83,7 @@ class ByteReader:
         start = self.at
         while start < end:
             stop = min(start + PIECE, end)
-            if stop < end:  # at the end of a line, of which there is one at last
+            if stop < end:  # at the end of a line, of which there is one at the end
                 line_end = self.data.find(b"\n", stop, end)
                 stop = end if line_end < 0 else line_end + 1
             piece = np.frombuffer(self.data, np.uint8, stop - start, start)

@@ -97,7 +97,7 @@ def expect_ignorable(n_nodes: int, cell: str) -> None:
     """
     if n_nodes > 3:
         raise MeshError(
-            f"{cell} has {n_nodes} nodes: beside tetrahedra there may be points, lines and "
+            f"{cell} has {n_nodes} nodes: besides tetrahedra there may be points, lines and "
             "triangles only. If it is a tetrahedron its type is wrong; if not, leave it out"
         )
 

@@ -45,7 +45,7 @@ class Elements:
         """Return the tetrahedra between nodes with `tags`, shape (n_nodes,), at `positions`.
 
         Raises:
-            MeshError: There are no tetrahedra, or cells that cannot be ignored beside them; a node
+            MeshError: There are no tetrahedra, or cells that cannot be ignored next to them; a node
                 or one of these cells occurs twice, or no node has a tag that is named.
         """
         rows = {number: np.concatenate(found) for number, found in self._rows.items()}

@@ -59,6 +59,6 @@ def remove_unfinished(path: str | os.PathLike[str]) -> None:
     """
     target = Path(path)
     start = f".{target.name}."
-    for beside in target.parent.iterdir():
-        if beside.name.startswith(start) and beside.name.endswith(UNFINISHED):
-            beside.unlink(missing_ok=True)
+    for sibling in target.parent.iterdir():
+        if sibling.name.startswith(start) and sibling.name.endswith(UNFINISHED):
+            sibling.unlink(missing_ok=True)

@@ -3,7 +3,7 @@
 from tissue.core.structs import Arrays
 
 OWN_SHARE = 0.2
-"""Share of the volume term beside springs that acts on each tetrahedron by itself. Where one
+"""Share of the volume term besides springs that acts on each tetrahedron by itself. Where one
 tetrahedron folds while its neighbours swell, averaged volumes do not change, and springs resist
 little: at 0 some 4 % were inverted in a block at half its height, with this share none; springs
 alone fold at 0.8 of the height. Bending locks a little: a bar of four cells deflects 0.68 of
@@ -99,7 +99,7 @@ def _stiffening(mu: float, lam: float, numbers: dict[str, float]) -> EnergyDensi
 
 
 def volume_term(modulus: float, *, averaged: bool = True) -> EnergyDensity:
-    """Return the law that only resists changes of volume, by that modulus [Pa]: beside springs.
+    """Return the law that only resists changes of volume, by that modulus [Pa]: besides springs.
 
     Args:
         modulus: What springs leave to it, lam - mu.

@@ -72,7 +72,7 @@ def _bench_table1(
     options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Cut the three grids of the paper's Table 1 by each scheme, beside the paper's figures."""
+    """Cut the three grids of the paper's Table 1 by each scheme, next to the paper's figures."""
     from scalpel_sim.validate.speed.table1 import measure_table1
 
     run_benchmark(lambda watch: measure_table1(options.runs, watch=watch), options, printing)

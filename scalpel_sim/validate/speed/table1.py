@@ -1,4 +1,4 @@
-"""The paper's Table 1: three grids, cut partly through by each scheme, beside the paper's figures.
+"""The paper's Table 1: three grids, cut partly through by each scheme, next to the paper's figures.
 
 The whole loop runs, as in the paper: read the arm, CD, GC, RX, force to the arm, and RD, a picture
 as in the live view. Only frames with the blade in the tissue count.

@@ -145,8 +145,8 @@ def _page(
         scripts: Files of its scripts, in order.
         controls: Elements of its bar.
         data: Script elements that come before these.
-        style: Rules beside those of all pages.
-        panels: Elements beside the picture.
+        style: Rules besides those of all pages.
+        panels: Elements next to the picture.
     """
     return Template(_part("page.html")).substitute(
         title=html.escape(title),

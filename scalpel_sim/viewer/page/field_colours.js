@@ -34,7 +34,7 @@ class FieldColours {
     constructor() {
         this.quantity = ""; // or a key of QUANTITIES
         this.tops = {}; // in the picture that is shown, SI
-        this.highest = {}; // so far: the range only grows, until the quantity is chosen anew
+        this.highest = {}; // so far: the range only grows, until the quantity is chosen again
         this.keepsRange = false; // or not even then
         this.table = Array.from({ length: N_STEPS }, (_, i) =>
             new THREE.Color(...viridis(i / (N_STEPS - 1))).convertSRGBToLinear());

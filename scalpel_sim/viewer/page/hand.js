@@ -62,7 +62,7 @@ class Hand {
         this.showControls();
     }
 
-    // After a silence the run has let go, or will: then the page engages anew.
+    // After a silence the run has released, or will: then the page engages again.
     sayAlive() {
         this.letGoOfSteps();
         if (!this.isEngaged) return;

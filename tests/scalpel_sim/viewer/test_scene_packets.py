@@ -62,7 +62,7 @@ def test_views_stand_in_the_frame_of_the_tissue_before_the_pages_own():
 
 
 def test_a_view_with_the_name_of_the_pages_own_stands_in_its_place():
-    view = ViewTable(name="beside the arms", eye=(0.2, 0.0, 0.0), target=(0.0, 0.0, 0.0))
+    view = ViewTable(name="next to the arms", eye=(0.2, 0.0, 0.0), target=(0.0, 0.0, 0.0))
     model, data = little_arm()
     packets = ScenePackets(shapes_of(model), FRAME, views=[view])
     opening = commands(packets.opening(cut_block(0.0), body_poses(data)))["set_cameras"]

@@ -116,7 +116,7 @@ def test_entities_are_refused_in_any_encoding(tmp_path):
     [
         (b"24", "tetrahedra with 10 nodes"),
         (b"5", "cell 3 is one of the triangles and has 4 nodes, not 3"),
-        (b"9", "cell 3, one of the quadrangles, has 4 nodes: beside tetrahedra there may be"),
+        (b"9", "cell 3, one of the quadrangles, has 4 nodes: besides tetrahedra there may be"),
         (b"8", "cell 3, one of the pixels, has 4 nodes"),
         (b"7", "cell 3, one of the polygons, has 4 nodes"),
         (b"4", "cell 3, one of the polylines, has 4 nodes"),

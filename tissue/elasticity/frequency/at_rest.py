@@ -60,7 +60,7 @@ rounds, further from it more nodes."""
 
 WORTH_IT = 0.98
 """Ratio of the highest bound on w^2 after and before a round above which the round is the last: in
-a regular mesh all nodes are alike, and there is nothing to gain."""
+a regular mesh all nodes are equal, and there is nothing to gain."""
 
 
 @kernel

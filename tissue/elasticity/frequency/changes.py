@@ -23,7 +23,7 @@ from tissue.mesh.star import Visits
 
 @kernel
 def forget_added_mass(scaling: MassScaling, body: Body, nodes: IntArray, n: int) -> None:
-    """Take the mass that the first `n` of `nodes` got out of the sum: their rows are made anew."""
+    """Take the mass that the first `n` of `nodes` got out of the sum: their rows are made again."""
     added = 0.0
     for i in range(n):
         added += body.added_masses[nodes[i]]

@@ -135,7 +135,7 @@ def ring_steps(options: Hierarchical, needed: Sequence[float]) -> tuple[int, Int
     for ring in range(last + 1, -1, -1):
         while steps[ring] < needed[ring]:
             steps[ring] *= 2
-        if ring <= last:  # no fewer than further out, where blade and old cuts are stiff alike
+        if ring <= last:  # no fewer than further out, where blade and old cuts are equally stiff
             while steps[ring] < steps[ring + 1]:
                 steps[ring] *= 2
     return steps[0], steps[0] // np.array(steps)
