@@ -199,29 +199,29 @@ class Bridge:
         rest_length: float | None = None,
         breaks_at: float = math.inf,
     ) -> DrivenFrame:
-        """Tie tissue by strands that the blade can cut, over any link; return their frame.
+        """Tie tissue by fibres that the blade can cut, over any link; return their frame.
 
-        The strands end at the frame, which rests until it is moved; `n_points` is the number of
-        strands.
+        The fibres end at the frame, which rests until it is moved; `n_points` is the number of
+        fibres.
 
         Args:
-            where: Where the strands begin; as for `attach`.
-            to: Where the strands end [m], tissue frame, shape (3,), or one place for each, (n, 3).
-            stiffness: Total stiffness of the strands along them [N/m].
-            area: Total cross-section of the strands [m2].
-            toughness: Energy of cutting a strand [J/m2].
-            damping: Total damping of the strands along them [N s/m].
+            where: Where the fibres begin; as for `attach`.
+            to: Where the fibres end [m], tissue frame, shape (3,), or one place for each, (n, 3).
+            stiffness: Total stiffness of the fibres along them [N/m].
+            area: Total cross-section of the fibres [m2].
+            toughness: Energy of cutting a fibre [J/m2].
+            damping: Total damping of the fibres along them [N s/m].
             rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
-            breaks_at: Total force of the strands at which they break [N].
+            breaks_at: Total force of the fibres at which they break [N].
 
         Raises:
             ValueError: see `tissue.Tissue.tie`, where the tissue is in this process.
             LinkError: the tissue is in another one, and refuses that or did not answer.
         """
         self._query.wait()
-        ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where strands end")
-        of_strands = (stiffness, area, toughness, damping, rest_length, breaks_at)
-        frame = self._driven.tie(FrameTie(plain_region(where), ends, *of_strands))
+        ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where fibres end")
+        of_fibres = (stiffness, area, toughness, damping, rest_length, breaks_at)
+        frame = self._driven.tie(FrameTie(plain_region(where), ends, *of_fibres))
         self._path = with_bodies(self._path, frame=frame.pose)
         return frame
 

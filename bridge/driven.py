@@ -50,24 +50,24 @@ class FrameAttachment(NamedTuple):
 
 
 class FrameTie(NamedTuple):
-    """Strands that tie tissue to a frame: what `tissue.Tissue.tie` takes."""
+    """Fibres that tie tissue to a frame: what `tissue.Tissue.tie` takes."""
 
     where: TissueRegion
-    """Where the strands begin; as `FrameAttachment.where`."""
+    """Where the fibres begin; as `FrameAttachment.where`."""
     to: FloatArray
-    """Where the strands end [m], shape (n, 3): one place for all, or one for each."""
+    """Where the fibres end [m], shape (n, 3): one place for all, or one for each."""
     stiffness: float
-    """Total stiffness of the strands along them [N/m]."""
+    """Total stiffness of the fibres along them [N/m]."""
     area: float
-    """Total cross-section of the strands [m2]."""
+    """Total cross-section of the fibres [m2]."""
     toughness: float
-    """Energy of cutting a strand [J/m2]."""
+    """Energy of cutting a fibre [J/m2]."""
     damping: float = 0.0
-    """Total damping of the strands along them [N s/m]."""
+    """Total damping of the fibres along them [N s/m]."""
     rest_length: float | None = None
     """Length up to which each is slack [m]; None: the distance of its ends."""
     breaks_at: float = math.inf
-    """Total force of the strands at which they break [N]."""
+    """Total force of the fibres at which they break [N]."""
 
 
 def plain_region(where: str | npt.ArrayLike) -> TissueRegion:

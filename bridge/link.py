@@ -113,7 +113,7 @@ class TissueLink(Protocol):
         """
 
     def tie(self, tie: FrameTie) -> int:
-        """Tie the body by strands to a frame, which the caller drives, as `attach` does.
+        """Tie the body by fibres to a frame, which the caller drives, as `attach` does.
 
         Raises:
             ValueError: see `tissue.Tissue.tie`.
@@ -231,7 +231,7 @@ class InProcessLink:
         return self._added(self._tissue.attach(**attachment._asdict()))
 
     def tie(self, tie: FrameTie) -> int:
-        """Tie the body by strands to a frame; see `TissueLink.tie`."""
+        """Tie the body by fibres to a frame; see `TissueLink.tie`."""
         ends = tie.to[0] if len(tie.to) == 1 else tie.to
         return self._added(self._tissue.tie(**tie._asdict() | {"to": ends}))
 

@@ -205,7 +205,7 @@ class DrivenBodies:
         return self._added(self._link.attach(attachment))
 
     def tie(self, tie: FrameTie) -> DrivenFrame:
-        """Tie tissue by strands to a frame; see `TissueLink.tie`."""
+        """Tie tissue by fibres to a frame; see `TissueLink.tie`."""
         return self._added(self._link.tie(tie))
 
     def _added(self, number: int) -> DrivenFrame:

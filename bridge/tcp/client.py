@@ -141,7 +141,7 @@ class TcpLink:
         return self._added(MessageKind.ATTACH, ATTACHMENT.pack(attachment))
 
     def tie(self, tie: FrameTie) -> int:
-        """Tie the body by strands to a frame; see `TissueLink.tie`."""
+        """Tie the body by fibres to a frame; see `TissueLink.tie`."""
         return self._added(MessageKind.TIE, TIE.pack(tie))
 
     def _added(self, kind: MessageKind, request: bytes) -> int:

@@ -29,7 +29,7 @@ _TITLES = {
     "face": "Faces of the blade",
     "back": "Back of the blade",
     "end": "Ends of the blade",
-    "strand": "Strands around the edge",
+    "fibre": "Fibres around the edge",
     "self-contact": "Contacts of the body with itself",
     "floor": "Floor",
     "geom": "Rigid geoms, mean of the frame",

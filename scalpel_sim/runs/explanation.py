@@ -27,7 +27,7 @@ from scalpel_sim.scene.scene import Scene
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 from tissue import ActingForce, FloatArray, Wrench
 
-OF_BLADE = ("edge", "face", "back", "end", "strand")
+OF_BLADE = ("edge", "face", "back", "end", "fibre")
 """Kinds of forces of the blade, which add up to the wrench on it."""
 
 LIMITS = (*SATURATIONS, "not_finite")

@@ -214,7 +214,7 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
 
 
 def _hold(tissue: Tissue) -> None:
-    """Attach the block, and tie it by a strand across the way of the edge."""
+    """Attach the block, and tie it by a fibre across the way of the edge."""
     tissue.attach("right", stiffness=10.0)
     middle = _SIDE / 2.0
     beyond = (_SIDE, middle, 1.5 * _SIDE)

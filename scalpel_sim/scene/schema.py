@@ -227,12 +227,12 @@ class AttachmentTable(TomlTable, kw_only=True, frozen=True):
     breaks_at: Positive | None = None
     """Force at which it releases the tissue [N]; none without."""
     to: ThreeNumbers | None = None
-    """Where the strands of a [ligament](own_arm.md#ligaments) end [m]. It has `area` and
+    """Where the fibres of a [ligament](own_arm.md#ligaments) end [m]. It has `area` and
     `toughness` too."""
     area: Positive | None = None
-    """Cross-section of all strands together [m2]."""
+    """Cross-section of all fibres together [m2]."""
     toughness: Positive | None = None
-    """Energy of cutting the strands [J/m2]."""
+    """Energy of cutting the fibres [J/m2]."""
     displacements: RowsOfThree | None = None
     """How far the frame, or the other ends of a ligament, are moved from where they are at first,
     row by row [m]."""

@@ -76,7 +76,7 @@ def test_a_bridge_s_grip_has_the_face_of_an_attachment():
         bridge.release(Bridge(cube()).attach("top", stiffness=1.0))
 
 
-STRANDS = {"stiffness": 200.0, "area": 2e-6, "toughness": 200.0, "damping": 1.0}
+FIBRES = {"stiffness": 200.0, "area": 2e-6, "toughness": 200.0, "damping": 1.0}
 
 
 def across(y):
@@ -88,8 +88,8 @@ def test_a_bridge_s_tie_is_a_ligament_that_the_blade_cuts():
     tissue, beside = cube(), cube()
     bridge = Bridge(tissue)
     above, where = (0.01, 0.01, 0.05), "sphere:0.01,0.01,0.02,0.011"
-    grip = bridge.tie(where, above, **STRANDS)
-    ligament = beside.tie(where, above, **STRANDS)
+    grip = bridge.tie(where, above, **FIBRES)
+    ligament = beside.tie(where, above, **FIBRES)
     assert grip.n_points == ligament.n_points == 6
     before = across(-0.01)
     for y in np.arange(-0.01, 0.05, 5e-4):
@@ -101,12 +101,12 @@ def test_a_bridge_s_tie_is_a_ligament_that_the_blade_cuts():
     assert grip.n_points == 0
 
 
-def test_strands_that_end_at_places_of_their_own_are_moved_by_their_frame():
+def test_fibres_that_end_at_places_of_their_own_are_moved_by_their_frame():
     """Two that hang down from a frame, which goes up: both pull up once they are taut."""
     bridge = Bridge(cube())
     corners = [[0.0, 0.0, 0.02], [0.02, 0.02, 0.02]]
     ends = np.add(corners, [0.0, 0.0, 0.03])
-    grip = bridge.tie(corners, ends, rest_length=0.031, **STRANDS)
+    grip = bridge.tie(corners, ends, rest_length=0.031, **FIBRES)
     for i in range(60):
         if i == 20:
             assert not grip.wrench.force.any()

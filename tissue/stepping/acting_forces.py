@@ -56,7 +56,7 @@ class ActingForce(NamedTuple):
     """One force from outside on a body."""
 
     kind: str
-    """edge, face, back, end, strand, self-contact, floor, geom, attachment, ligament, load or
+    """edge, face, back, end, fibre, self-contact, floor, geom, attachment, ligament, load or
     support."""
     name: str
     """Its name among those of its kind."""
@@ -110,7 +110,7 @@ def _forces_of_blade(stages: StepStages) -> Iterator[ActingForce]:
             kind = "end" if side in (HEEL_END, TIP_END) else "back"
             name, state, limit = _spine_sample(blade.spine, index, contacts, row, limit)
         else:
-            kind, name, state = "strand", f"strand {index}", "caught by the edge"
+            kind, name, state = "fibre", f"fibre {index}", "caught by the edge"
         yield ActingForce(
             kind,
             name,

@@ -153,8 +153,8 @@ def _check_attachment(attachment: FrameAttachment) -> None:
 
 def _check_tie(tie: FrameTie) -> None:
     if not len(tie.to):
-        raise MessageError("strands without an end")
-    expect_near(tie.to, "the end of a strand")
+        raise MessageError("fibres without an end")
+    expect_near(tie.to, "the end of a fibre")
 
 
 def _check_geoms(request: _Geoms) -> None:
@@ -196,7 +196,7 @@ TIE: Message[FrameTie] = Message(
     "the request to tie a frame",
     _check_tie,
 )
-"""The request to tie a frame by strands."""
+"""The request to tie a frame by fibres."""
 
 NUMBER: Message[int] = Message(Count, "the number of a frame")
 """The request to release a frame."""

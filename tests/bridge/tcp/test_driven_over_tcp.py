@@ -72,7 +72,7 @@ def link(server):
 
 
 def held_tied_and_cut(link, upright):
-    """Two grips, one of which lets go by itself, and two strands, between which a blade cuts."""
+    """Two grips, one of which lets go by itself, and two fibres, between which a blade cuts."""
     bridge, found = Bridge(link), []
     grips = [
         bridge.attach([[x, 0.01, 0.02]], stiffness=50.0, damping=0.5, breaks_at=limit)
@@ -113,7 +113,7 @@ def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):
     assert link.step(None, DT, [pose(0)]).n_tetrahedra == 72
 
 
-STRANDS = FrameTie("top", np.array([[0.01, 0.01, 0.05]]), 100.0, 1e-6, 50.0)
+FIBRES = FrameTie("top", np.array([[0.01, 0.01, 0.05]]), 100.0, 1e-6, 50.0)
 
 
 @pytest.mark.parametrize(
@@ -122,10 +122,10 @@ STRANDS = FrameTie("top", np.array([[0.01, 0.01, 0.05]]), 100.0, 1e-6, 50.0)
         (FrameAttachment("tpo", 100.0), "Did you mean 'top'"),
         (FrameAttachment("top", -1.0), "stiffness is -1.0"),
         (FrameAttachment(np.array([[9.0, 9.0, 9.0]]), 100.0), "outside the body"),
-        (STRANDS._replace(area=0.0), "area is 0.0 m2; it must be positive"),
-        (STRANDS._replace(stiffness=np.inf), "the request to tie a frame cannot be read"),
+        (FIBRES._replace(area=0.0), "area is 0.0 m2; it must be positive"),
+        (FIBRES._replace(stiffness=np.inf), "the request to tie a frame cannot be read"),
         (
-            STRANDS._replace(to=np.tile(STRANDS.to, (2, 1))),
+            FIBRES._replace(to=np.tile(FIBRES.to, (2, 1))),
             "one place in m, or one for each of",
         ),
     ],
@@ -142,7 +142,7 @@ def test_more_frames_than_there_may_be_are_refused(monkeypatch):
     monkeypatch.setattr("bridge.tcp.server.MAX_FRAMES", 1)
     threading.Thread(target=server.run, daemon=True).start()
     with contextlib.closing(TcpLink(server.address)) as other:
-        other.tie(STRANDS)
+        other.tie(FIBRES)
         with pytest.raises(LinkError, match="there are 1 frames, and there may be no more"):
             other.attach(FrameAttachment("top", 100.0))
 

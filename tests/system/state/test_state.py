@@ -68,7 +68,7 @@ class Case(NamedTuple):
 
 
 def hold(tissue: Tissue) -> None:
-    """Push it, pull it by an attachment, and tie it by strands that the blade meets."""
+    """Push it, pull it by an attachment, and tie it by fibres that the blade meets."""
     tissue.push([MESH.positions.mean(axis=0)], (0.0, 0.0, 0.05))
     high = MESH.positions[:, 2].max()
     nodes = np.flatnonzero(MESH.positions[:, 2] > high - 1e-6)[:6]

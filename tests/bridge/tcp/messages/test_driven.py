@@ -67,8 +67,8 @@ def test_an_attachment_with_one_wrong_part_is_refused_by_name(change, why):
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        ({"to": b""}, "strands without an end"),
-        ({"to": raw(0.0, 0.0, 2e3)}, "the end of a strand is not within"),
+        ({"to": b""}, "fibres without an end"),
+        ({"to": raw(0.0, 0.0, 2e3)}, "the end of a fibre is not within"),
         ({"area": np.nan}, "area"),
     ],
 )
