@@ -125,7 +125,7 @@ def block_material(law: str, *, is_damped: bool = True) -> Material:
 class EngineLoops:
     """A block of tissue, and the loops that advance it.
 
-    Each method runs its loop `n` times, as `timing.Case` asks for.
+    Each method runs its loop `n` times, as `timing.Case` requests.
 
     Args:
         mesh: The block.
@@ -257,7 +257,7 @@ class TouchingBlocks:
             system.find_contacts(FRAME_DT)
 
     def forces(self, n: int) -> None:
-        """Evaluate the forces of the contacts, and let them slide, as in every Verlet step."""
+        """Evaluate the forces of the contacts, with sliding, as in every Verlet step."""
         system, body, contacts = self._tissue._model, self._tissue._body, self._contact.forces
         x, v, external = body.positions, body.velocities, system.stages.external
         for _ in range(n):

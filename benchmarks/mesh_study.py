@@ -94,7 +94,7 @@ class Model(NamedTuple):
 def models() -> list[Model]:
     """Return the laws that are studied."""
     plain = Material(10e3, 1000.0, law="springs", poisson_ratio=0.25)
-    found = [Model("springs, nu 0.25 asked", plain)]
+    found = [Model("springs, nu 0.25 required", plain)]
     for nu in RATIOS:
         material = Material(10e3, 1000.0, law="neo_hookean", poisson_ratio=nu)
         if nu > 0.0:

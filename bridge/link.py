@@ -1,4 +1,4 @@
-"""How a blade sweep reaches the tissue. The arm side cannot tell one link from another."""
+"""How a blade sweep reaches the tissue. The arm side cannot distinguish one link from another."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def main() -> None:
 
     try:
         code = command_line(sys.argv[1:])
-    except KeyboardInterrupt as error:  # one more signal, while the first was told
+    except KeyboardInterrupt as error:  # one more signal, while the first was reported
         print(f"error: {error}", file=sys.stderr)
         code = EXIT_RUN_FAILED
     ignore_signals()  # all is done, and a signal would change the code

@@ -35,7 +35,7 @@ class SolverSettings:
     """Angular frequency [1/s] above which nodes get mass: those of slivers that a cut has left, and
     those that strain or the blade makes as fast, so that a few nodes do not set the time step;
     None: no mass is added. The added mass has no weight, and
-    `CutReport.now.added_mass` tells how much it is. For the laws of tetrahedra; where the elements
+    `CutReport.now.added_mass` says how much it is. For the laws of tetrahedra; where the elements
     of the uncut body are faster, their frequency is the limit."""
     precision: str = "double"
     """Precision in which the forces of tetrahedra are computed: `double`, or `single`, which takes

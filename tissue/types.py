@@ -23,7 +23,7 @@ CUT_COLOUR = (212, 68, 60, 255)
 
 
 class TissueError(RuntimeError):
-    """The tissue cannot go on: its motion became unstable. What it was before can still be read."""
+    """The tissue cannot continue: motion became unstable. What it was before can still be read."""
 
 
 class RigidContacts(NamedTuple):
@@ -95,7 +95,7 @@ class Energies(NamedTuple):
     """Energy lost as the mesh changes: impacts of nodes that part, and, under laws other than plain
     tetrahedra, elastic energy."""
     released: float
-    """Energy of contacts and fibres that the blade released, and of attachments that let go, which
+    """Energy of contacts and fibres that the blade released, and of released attachments, which
     is lost; less that of attachments that began under tension."""
 
     @property

@@ -4,7 +4,7 @@ An adapter is a function that takes a body and a case and returns a `PeerStepper
 runs this file need not have this project or its dependencies, only NumPy and the engine: so nothing
 here imports the project, except `ours`, and each adapter imports its engine itself.
 
-Each case runs on one core and one thread. The parent process asks them in turn to step for a number
+Each case runs on one core and one thread. The parent process has them step in turn for a number
 of seconds, one line of text each; the answer is a line of JSON with the CPU time that the steps
 took, of the whole process with its own threads. A process that waits uses no CPU time. Standard
 output belongs to these answers.

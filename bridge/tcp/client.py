@@ -145,7 +145,7 @@ class TcpLink:
         return self._added(MessageKind.TIE, TIE.pack(tie))
 
     def _added(self, kind: MessageKind, request: bytes) -> int:
-        """Ask for a frame, and return its number."""
+        """Request a frame, and return its number."""
         before = self.loads()
         reply = self._connection.request(kind, request, LOAD_BYTES, LOAD.unpack)
         self._loads = [*before, reply]

@@ -263,7 +263,7 @@ class _Wait:
             raise TimeoutError
 
     def end_piece(self) -> None:
-        """Do what is due after a piece."""
+        """Handle what is due after a piece."""
         self.check()
         self._while_waiting()
 

@@ -1,4 +1,4 @@
-"""Cut a block that is held on one side only, and let the loose half fall on a floor."""
+"""Cut a block that is held on one side only; the loose half falls on a floor."""
 
 import numpy as np
 

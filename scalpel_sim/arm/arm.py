@@ -181,7 +181,7 @@ class DrivenArm:
         """
         data = self.data
         angles, speeds = self._qpos.tolist(), self._qvel.tolist()
-        # A sum is finite only if all its parts are, and costs less than asking each.
+        # A sum is finite only if all its parts are, and costs less than a test of each.
         if not math.isfinite(sum(angles) + sum(speeds)):
             bad = ~(np.isfinite(data.qpos) & np.isfinite(data.qvel))
             names = ", ".join(np.array(self.joints)[bad]) or "all, by overflow"
@@ -239,7 +239,7 @@ class Arm(DrivenArm):
     Args:
         preset: One of `ARMS`.
         blade_length: From heel to tip [m].
-        mount_angle: Between stylus and blade [rad]: at 0 the blade goes on in the stylus's
+        mount_angle: Between stylus and blade [rad]: at 0 the blade continues in the stylus's
             direction, at pi/2 it points to the stylus's +z.
         base_position: Middle of the base's underside [m].
         base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.

@@ -190,7 +190,7 @@ def hinge_displacement(angles: FloatArray, start: FloatArray, reach: FloatArray)
 def arms_of_geoms(model: mujoco.MjModel, fixtures: Collection[int]) -> IntArray:
     """Return for each geom the body of the world that carries it; `WORLD` for what is no arm.
 
-    Arms are told apart by it: each stands on one body of the world.
+    Arms are distinguished by it: each stands on one body of the world.
 
     Args:
         model: A compiled model.

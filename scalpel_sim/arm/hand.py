@@ -108,7 +108,7 @@ def add_hand(
         rgba=[1.0, 0.6, 0.2, 0.5],
         contype=0,
         conaffinity=0,
-        group=3,  # hidden unless asked for
+        group=3,  # hidden unless requested
     )
     *springs, turn = (
         # Each acts on the middle of the edge as seen from the hand.

@@ -48,7 +48,7 @@ SMALLEST_SCALE, SCALE_HALVINGS = 1e-3, 7
 
 
 class PlacementError(UsageError):
-    """No arm that was asked for reaches the stroke."""
+    """No arm that was requested reaches the stroke."""
 
 
 class Neighbours(NamedTuple):

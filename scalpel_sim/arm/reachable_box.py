@@ -74,7 +74,7 @@ def arm_for(preset: str, shares: FloatArray) -> str:
     """Return which arm is to reach shares of a workspace: the largest, where not all is reached.
 
     Args:
-        preset: What was asked for, one of `ARMS` or `auto`.
+        preset: What was requested, one of `ARMS` or `auto`.
         shares: How much of it along each axis, around the start, shape (3,).
     """
     return list(ARMS)[-1] if preset == AUTO and shares.min() < 1.0 else preset

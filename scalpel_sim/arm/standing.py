@@ -162,7 +162,7 @@ def collide_as_one_arm(spec: mujoco.MjSpec, there: mujoco.MjSpec) -> None:
     group = next((bit for bit in ARM_GROUPS if not bit & taken), None)
     if group is None:
         raise ValueError(
-            f"there are more than {len(ARM_GROUPS)} arms, which MuJoCo cannot tell apart"
+            f"there are more than {len(ARM_GROUPS)} arms, which MuJoCo cannot distinguish"
         )
     for body in spec.bodies[1:]:
         if body.mocap:  # a hand is not solid

@@ -111,7 +111,7 @@ def _run(
         if output.resume is not None:
             if scene is not None or is_led:
                 raise UsageError(
-                    "--resume goes on with the run in its folder; omit the scene and --hand"
+                    "--resume continues the run in its folder; omit the scene and --hand"
                 )
             return expect_no_warnings(perform_resumed(output.resume, options), output)
         if scene is not None and is_toml_file(scene) and is_case(Path(scene)):

@@ -20,7 +20,7 @@ MOST_ROWS = 12
 """Forces of one kind that a table shows; `--json` has all."""
 
 LEAST_FORCE = 5e-4
-"""Force below which a limit has cut off nothing that the sentence tells [N]."""
+"""Force below which a limit has cut off nothing that the sentence reports [N]."""
 
 _MM_PER_M = 1e3
 
@@ -129,7 +129,7 @@ def _lines_on_bridge(found: "Explanation") -> list[str]:
     lines = [f"bridge: {raw} from the tissue, {felt} felt by the arm; limits that acted: {acted}"]
     lines.append("coupling: " + ", ".join(f"{key} {text}" for key, text in found.coupling.items()))
     if not found.answered:
-        lines.append("The tissue was not asked in this frame: its forces are of its last answer.")
+        lines.append("The tissue was not queried in this frame: its forces are of its last answer.")
     return lines
 
 

@@ -149,7 +149,7 @@ class MaterialOptions:
     """Name of a material (liver, kidney, skin, fat, muscle, gelatin, silicone), or a FILE.toml. The
     command `materials` lists the names and writes a file to start from."""
     calibrate: Flag = False
-    "Measure the springs on this mesh first, and make them as stiff as asked for. Law springs only."
+    "Measure the springs on this mesh first, and make them as stiff as requested. Law springs only."
     spring_error: Flag = False
     "Report how far springs on this mesh are from the material that they stand for."
 

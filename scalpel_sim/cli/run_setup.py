@@ -62,7 +62,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
 
 
 class RunOptions(NamedTuple):
-    """What the command line asks for, group by group."""
+    """What the command line requests, group by group."""
 
     tissue: TissueOptions
     arm: ArmOptions
@@ -80,11 +80,11 @@ def prepared_run(
     relaxation: str | None = None,
     is_led: bool = False,
 ) -> Iterator[PreparedRun]:
-    """Yield the run that the command line asks for, and close the link to the tissue afterwards.
+    """Yield the run that the command line requests, and close the link to the tissue afterwards.
 
     Args:
         name: The scene; None for the default one.
-        options: What the command line asks for.
+        options: What the command line requests.
         audits: Whether an account of the energy is kept where nothing is said of it.
         relaxation: How the motion is advanced where nothing is said of it, and the tissue does not
             stiffen; None: as the scene has it.
@@ -167,13 +167,13 @@ def _tissue_elsewhere(
 
 
 def perform_resumed(folder: Path, options: RunOptions) -> Summary:
-    """Go on with a run; print and return its summary.
+    """Continue a run; print and return its summary.
 
-    A run that a hand led goes on with what the hand did until it was killed, and then rests.
+    A run that a hand led continues with what the hand did until it was killed, and then rests.
 
     Args:
         folder: The folder of its files.
-        options: What the command line asks for.
+        options: What the command line requests.
 
     Raises:
         UsageError: there is no such run, it is complete, or an option does not go with it.
@@ -184,7 +184,7 @@ def perform_resumed(folder: Path, options: RunOptions) -> Summary:
         OSError: a file cannot be read.
     """
     given = (options.tissue, options.arm, options.client)
-    expect_no_options(given, "--resume, which goes on with what the run was asked for")
+    expect_no_options(given, "--resume, which continues the run with what was requested")
     if options.output.out is not None:
         raise UsageError("--out is given with --resume, which writes to its folder; omit --out")
     if folder.is_dir():
@@ -215,7 +215,7 @@ def _end_records(folder: Path, resumption: Resumption) -> None:
             end_record(path, t_end, None if done is None else done.n_bytes)
         except (OSError, ValueError) as error:
             raise RunError(
-                f"{path}: what the hand did cannot be read ({error}), and the run cannot go on"
+                f"{path}: what the hand did cannot be read ({error}), and the run cannot continue"
             ) from error
 
 
@@ -247,7 +247,7 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
 
     Raises:
         UsageError: the scene's law has no springs.
-        ValueError: no stiffness of the springs gives the Young's modulus that is asked for.
+        ValueError: no stiffness of the springs gives the Young's modulus that is requested.
     """
     if not (options.calibrate or options.spring_error):
         return scene, {}

@@ -1,4 +1,4 @@
-"""The scene that the command line asks for: a file, the environment, `--set`, and the options."""
+"""The scene that the command line requests: a file, the environment, `--set`, and the options."""
 
 import logging
 import os
@@ -55,7 +55,7 @@ def chosen_scene(
     relaxation: str | None = None,
     audits: bool = False,
 ) -> Scene:
-    """Return the scene, or one around the user's mesh, with the changes that the user asks for.
+    """Return the scene, or one around the user's mesh, with the changes that the user requests.
 
     Args:
         name: A scene that comes with the project, or a FILE.toml; None for the default one.
@@ -115,7 +115,7 @@ def read_figures(path: Path, table: str, unused: str | None = None) -> dict[str,
     Args:
         path: The file.
         table: `material` or `blade`.
-        unused: The other table, if no option asks for it: a file that has it gets a warning.
+        unused: The other table, if no option requests it: a file that has it gets a warning.
 
     Raises:
         UsageError: the file cannot be read, has no such table, or a key or value is wrong.

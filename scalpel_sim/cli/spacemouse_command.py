@@ -22,7 +22,7 @@ def spacemouse(
     """Lead the blade of a run by a SpaceMouse, from another terminal.
 
     The blade moves and turns while the cap is deflected, along the axes of the world: to the right
-    is +x, away from you +y, up +z. The left button lets go while it is pressed, the right one ends
+    is +x, away from you +y, up +z. The left button releases while it is pressed, the right one ends
     the run. It waits two minutes for a run that still gets ready. It needs
     `pip install scalpel-sim[spacemouse]` and the library hidapi.
 

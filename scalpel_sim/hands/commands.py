@@ -15,19 +15,19 @@ FARTHEST_TURN = math.pi / 2.0
 """Largest turn of one message [rad]."""
 
 SLOWEST = 0.01
-"""Slowest motion that may be asked for: simulated time over wall time."""
+"""Slowest motion that may be requested: simulated time over wall time."""
 
 LATEST_STAMP = 1e12
 """Largest stamp [ms]: some thirty years."""
 
 LONGEST_SILENCE = 2.0
-"""Wall time without a message after which an engaged hand lets go [s]. The page says ten times a
+"""Wall time without a message after which an engaged hand releases [s]. The page says ten times a
 second that it is there, but where drawing takes all of the machine, its thread hangs for a second.
-Until then the blade goes no farther than it was asked to, and a page that is closed lets go at
+Until then the blade goes no farther than was requested, and a page that is closed releases at
 once."""
 
 HIGHEST_TOUGHNESS, THICKEST_BLADE = 1e4, 2e-3
-"""Highest fracture toughness [J/m2] and thickest blade [m] that a page may ask for: beyond those of
+"""Highest fracture toughness [J/m2] and thickest blade [m] that a page may request: beyond those of
 skin and of any scalpel."""
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{0,64}$")]
@@ -44,7 +44,7 @@ class Engage(_Message, frozen=True, tag="engage"):
 
 
 class Release(_Message, frozen=True, tag="release"):
-    """The hand lets go: the instrument stays where it is."""
+    """The hand releases: the instrument stays where it is."""
 
 
 class Move(_Message, frozen=True, tag="move"):
@@ -70,11 +70,11 @@ class StillThere(_Message, frozen=True, tag="still there"):
 
 
 class Lead(_Message, frozen=True, tag="lead"):
-    """The page asks to be the one that leads."""
+    """The page requests to be the one that leads."""
 
 
 class Choose(_Message, frozen=True, tag="choose"):
-    """Lead another instrument from now on; the hand lets go of the one before."""
+    """Lead another instrument from now on; the hand releases the one before."""
 
     instrument: Annotated[int, msgspec.Meta(ge=0)]
     """Number of the instrument: 0 is the blade, the graspers follow in the order of the scene."""
@@ -92,15 +92,15 @@ class End(_Message, frozen=True, tag="end"):
 
 
 class Pause(_Message, frozen=True, tag="pause"):
-    """The hand lets go, and time stands still."""
+    """The hand releases, and time stands still."""
 
 
 class Resume(_Message, frozen=True, tag="resume"):
-    """Time goes on."""
+    """Time continues."""
 
 
 class Step(_Message, frozen=True, tag="step"):
-    """Time goes on for a moment, and stands still again."""
+    """Time continues for a moment, and stands still again."""
 
 
 class SlowMotion(_Message, frozen=True, tag="slow motion"):
@@ -145,7 +145,7 @@ _decoder: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
 
 
 def command_of(message: str | bytes) -> Command | None:
-    """Return the command of a message; None where it is none, or asks for too much."""
+    """Return the command of a message; None where it is none, or requests too much."""
     if len(message) > LONGEST_MESSAGE:
         return None
     try:

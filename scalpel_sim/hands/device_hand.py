@@ -14,7 +14,7 @@ from scalpel_sim.simulation import Simulation
 from tissue import BladeSegment, FloatArray, Wrench
 
 WATCHDOG = 0.04
-"""Wall time without a pose after which the hand lets go [s]: forty periods of a haptic device. With
+"""Wall time without a pose after which the hand releases [s]: 40 periods of a haptic device. With
 a frame of 10 ms, in which an organ is cut, the blade rests within 50 ms."""
 
 
@@ -29,7 +29,7 @@ class DeviceHand(Teleoperation):
         listen: Takes what the device has sent, and calls the methods of this hand; called before
             each frame, so that only the device's own silence counts as one.
         seconds: How long it leads at most [s]; then it has ended.
-        watchdog: Wall time without a pose after which it lets go [s].
+        watchdog: Wall time without a pose after which it releases [s].
         ends_with_client: Whether the stroke ends when a device that has led is silent for so long,
             or disconnects; otherwise the blade rests, and a device may come again.
         clock: Wall time [s].
@@ -61,10 +61,10 @@ class DeviceHand(Teleoperation):
 
         Args:
             pose: Where the stylus is, world frame.
-            holds: Whether it leads the blade; otherwise this lets go.
+            holds: Whether it leads the blade; otherwise this releases it.
 
         Raises:
-            ValueError: no stylus moves so far between two calls. The hand has let go.
+            ValueError: no stylus moves so far between two calls. The hand has released.
         """
         before = self._stylus
         if not holds or self.ended_at is not None:

@@ -77,12 +77,12 @@ class LiveInstrument(abc.ABC):
         """Close or open its jaws, if it has any."""
 
     def advance(self, t: float, *, is_engaged: bool, moves: bool) -> None:
-        """Go on to time `t` [s], and record where it is.
+        """Continue to time `t` [s], and record where it is.
 
         Args:
             t: A frame after the last one [s].
             is_engaged: Whether a person leads it.
-            moves: Whether it goes on; else it rests where it is.
+            moves: Whether it continues; else it rests where it is.
         """
         if moves and self._record.has_begun:  # the record begins at the start
             if self.pose.step():

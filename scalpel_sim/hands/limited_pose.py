@@ -21,7 +21,7 @@ of them the blade should not stop."""
 
 FARTHEST_AHEAD, MOST_AHEAD_TURN = 0.04, 0.4
 """How far the wanted pose may be ahead of the hand [m, rad]: what it does in a fifth of a second.
-What is asked beyond is lost, so that the blade stops soon after the person does."""
+What is requested beyond is lost, so that the blade stops soon after the person does."""
 
 ARRIVED, ARRIVED_TURN = 1e-7, 1e-6
 """Distance [m] and angle [rad] from the wanted pose at which the hand is there: a thousandth of a
@@ -52,10 +52,10 @@ class LimitedPose:
 
     def move(self, by: FloatArray) -> None:
         """Move the wanted pose by a displacement [m], as far as it may be ahead."""
-        asked = self.wanted + by
-        ahead = np.clip(asked, *self._workspace) - self.middle
+        requested = self.wanted + by
+        ahead = np.clip(requested, *self._workspace) - self.middle
         self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
-        self._is_limited |= math.dist(asked.tolist(), self.wanted.tolist()) > ARRIVED
+        self._is_limited |= math.dist(requested.tolist(), self.wanted.tolist()) > ARRIVED
 
     def turn(self, by: FloatArray) -> None:
         """Turn the wanted pose by a rotation vector [rad], as far as it may be ahead."""

@@ -181,7 +181,7 @@ class RunControls:
         pace: How fast time passes.
         history: Where the run can go back to.
         hand: Obeys the commands that lead the blade; None: a script leads it.
-        commands: What the page asks; any thread may append. None: there is no page.
+        commands: What the page requests; any thread may append. None: there is no page.
         sleep: Waits for so many seconds.
     """
 
@@ -202,9 +202,9 @@ class RunControls:
         self.has_ended = False
         """Whether the page has ended the run."""
         self.next: Begin | None = None
-        """The run that the page has asked for after this one."""
+        """The run that the page has requested after this one."""
         self.notice = ""
-        """What the page is to tell the person."""
+        """What the page is to report to the person."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
         self.on_wait: Callable[[], None] = lambda: None

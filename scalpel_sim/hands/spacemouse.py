@@ -23,10 +23,10 @@ DEAD_ZONE = 0.05
 """Share of full deflection that counts as none: a cap at rest reports up to some hundredths."""
 
 LONGEST_GAP = 0.05
-"""Longest time between two looks that counts in full [s], so that a pause is no leap."""
+"""Longest time between two readings that counts in full [s], so that a pause is no leap."""
 
 LET_GO_BUTTON, END_BUTTON = 0, 1
-"""The left button lets go while it is pressed, the right one ends the run."""
+"""The left button releases while it is pressed, the right one ends the run."""
 
 
 class SpaceMouseReading(Protocol):

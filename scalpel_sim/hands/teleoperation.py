@@ -92,7 +92,7 @@ class Teleoperation(abc.ABC):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Where all instruments are led, and how far jaws are open: they tell moments apart."""
+        """Where all instruments are led, and how far jaws are open: they distinguish moments."""
         return tuple(number for each in self.instruments for number in each.numbers)
 
     @property

@@ -26,7 +26,7 @@ bends that those make in the ways of the joints are undone."""
 _CLOSE: Final = 0.5
 """How near each pose must be in it, see `Miss.size`."""
 _CUTOFF: Final = 1e-3
-"""Singular value, over the largest, below which joints are not asked for a motion in it."""
+"""Singular value, over the largest, below which no motion in it is required of joints."""
 _FARTHER: Final = (0.0, 1e-3, 5e-3, 0.02, 0.05)
 """How far beyond the border of reach poses are moved [m], one after the other: at the border, where
 an arm is stretched, the search for a configuration may end just next to it."""
@@ -127,7 +127,7 @@ def _shift_into_reach(
 
     Newton's method for a configuration at each pose and the displacement of all together. What the
     poses leave free makes the displacement smaller: task priority (Nakamura 1987, Int. J. Robotics
-    Research 6:3). Joints at an end of their range, that would go on, take no part in a step.
+    Research 6:3). Joints at an end of their range, that would continue, take no part in a step.
 
     Args:
         solver: For the arm.

@@ -47,7 +47,7 @@ def energy_released(recording: Recording) -> Stretch | None:
 
     The blade has gone as far there: the mesh opens in jerks, and energy flows as the blade goes.
     The energy is the work of the blade, or what was spent where it had been stored before.
-    What the blade held at the start, and lets go where it leaves the tissue, is not counted.
+    What the blade held at the start, and releases where it leaves the tissue, is not counted.
 
     Args:
         recording: With an account of the energy.

@@ -41,7 +41,7 @@ class SurfacePiece(NamedTuple):
 
 
 def export_surface(surface: Surface, path: Path) -> None:
-    """Write a body's surface in the format that the file name's ending asks for.
+    """Write a body's surface in the format that the file name's ending requests.
 
     Raises:
         UsageError: the ending is none of `ENDINGS`.

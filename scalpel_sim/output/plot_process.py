@@ -40,7 +40,7 @@ class Plotter:
         )
 
     def start(self, recorded: Path, title: str, forces: Path, energies: Path) -> None:
-        """Ask for the plots of a `forces.csv`. They are drawn while this process goes on.
+        """Request the plots of a `forces.csv`. They are drawn while this process continues.
 
         Args:
             recorded: The table.
@@ -88,7 +88,7 @@ class Plotter:
 
 
 def draw_requested_plots() -> None:
-    """Load matplotlib, and draw the plots that standard input then asks for."""
+    """Load matplotlib, and draw the plots that standard input then requests."""
     from scalpel_sim.output.plots import plot_energies, plot_forces
     from scalpel_sim.recording.recording import read_forces
 
@@ -105,11 +105,11 @@ def draw_requested_plots() -> None:
 
 @contextlib.contextmanager
 def _file_of(owner: int, path: str) -> Iterator[Path]:
-    """Yield a name to draw at, which replaces `path` if the process that asked for it still runs.
+    """Yield a name to draw at, which replaces `path` if the process that requested it still runs.
 
     The folder of one that was killed may be that of another run by now.
     """
     with whole_file(path) as unfinished:
         yield unfinished
         if os.getppid() != owner:
-            sys.exit("the run that asked for the plot has ended")
+            sys.exit("the run that requested the plot has ended")

@@ -167,7 +167,7 @@ def _springs(springs: dict[str, float]) -> _Rows:
 def _cut(summary: Summary) -> _Rows:
     """Yield the area of the cut, the forces, the collisions and the work."""
     asked = summary.asked_area_m2
-    share = f", {summary.cut_area_m2 / asked:.0%} of what is asked" if asked else ""
+    share = f", {summary.cut_area_m2 / asked:.0%} of what is planned" if asked else ""
     yield "cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²{share}"
     if summary.finished_area_m2 > 0.0:
         finished = f"{summary.finished_area_m2 * _MM2_PER_M2:,.1f} mm² of the cut, at no work"
@@ -182,7 +182,7 @@ def _cut(summary: Summary) -> _Rows:
     for number, each in enumerate(summary.attachments, 1):
         name = f"attachment {number}" + (f", {each['where']}" if each["where"] else "")
         peak, end = each["force_peak_n"], each["force_at_end_n"]
-        left = "" if each["points"] else ", let go"
+        left = "" if each["points"] else ", released"
         yield name, f"{peak:.3f} N at most, {end:.3f} N at the end{left}"
     for hand in summary.hands:
         held = f"{hand['points_held_most']:,} points held at most"

@@ -90,9 +90,9 @@ class RunOutcome:
 
     @property
     def is_stroke_over(self) -> bool:
-        """Whether the run reached the end of a stroke that a script asks for.
+        """Whether the run reached the end of a stroke that a script plans.
 
-        One that ends before, as `seconds` may ask, is not judged by what the stroke was to do; nor
+        One that ends before, as `seconds` may say, is not judged by what the stroke was to do; nor
         is a hand.
         """
         return not self.stroke.is_led and self.seconds >= self.stroke.duration

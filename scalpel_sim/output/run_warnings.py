@@ -1,4 +1,4 @@
-"""Warnings at the end of a run that did not do what it was asked, and why, as far as it is seen.
+"""Warnings at the end of a run that did not do what was planned, and why, as far as it is seen.
 
 Each check is a function of the outcome of a run, and `CHECKS` is the list of them.
 """
@@ -28,20 +28,20 @@ _FACE = 2.0
 of a cell of a grid."""
 
 _MOVED = 0.5
-"""How far a body, or a blade from its place, is moved before it is told, in node sizes."""
+"""How far a body, or a blade from its place, is moved before it is reported, in node sizes."""
 
 _TURNED = math.radians(2.0)
-"""By how much a body has turned before it is told [rad]."""
+"""By how much a body has turned before it is reported [rad]."""
 
 _GIVEN_WAY = 5e-3
-"""How much farther than it cut the edge went in the tissue before it is told [m]: any edge drags
-tissue along by a few millimetres."""
+"""How much farther than it cut the edge went in the tissue before it is reported [m]: any edge
+drags tissue along by a few millimetres."""
 
 _MM, _MM2 = 1e3, 1e6
 
 
 class RunWarning(NamedTuple):
-    """Something that a run was asked for and did not do."""
+    """Something that was planned for a run and was not done."""
 
     kind: str
     """Name of the kind, which stays."""
@@ -129,7 +129,9 @@ def _blade_inside(outcome: RunOutcome) -> Iterator[RunWarning]:
     if not outcome.is_stroke_over or not outcome.edge_inside or outcome.is_to_end_inside:
         return
     why, figures = _reasons(outcome)
-    yield RunWarning("blade_inside", f"the blade did not leave the tissue as asked; {why}", figures)
+    yield RunWarning(
+        "blade_inside", f"the blade did not leave the tissue as planned; {why}", figures
+    )
 
 
 def _failed_grasp(outcome: RunOutcome) -> Iterator[RunWarning]:
@@ -152,8 +154,8 @@ def _failed_grasp(outcome: RunOutcome) -> Iterator[RunWarning]:
 
 
 def _energy_released(outcome: RunOutcome) -> Iterator[RunWarning]:
-    """Warn of energy that is lost where the blade lets go of tissue, instead of cutting it."""
-    # Attachments and ligaments that let go release energy, too.
+    """Warn of energy that is lost where the blade releases tissue, instead of cutting it."""
+    # Attachments and ligaments that are released free energy, too.
     if not outcome.recording.is_audited or outcome.recording.n_held:
         return
     stretch = energy_released(outcome.recording)
@@ -195,11 +197,11 @@ CHECKS: tuple[tuple[RunCheck, ...], ...] = (
     (_area_unpaid,),
 )
 """The checks of a run. Of those in one group the first that finds something speaks for the others,
-which tell of the same."""
+which report the same."""
 
 
 def _lack_of_pieces(outcome: RunOutcome) -> str | None:
-    """Return how many pieces there are, if those are fewer than asked for."""
+    """Return how many pieces there are, if those are fewer than planned."""
     n, asked = outcome.n_pieces, outcome.asked_pieces
     if asked is None or n >= asked:
         return None
@@ -207,7 +209,7 @@ def _lack_of_pieces(outcome: RunOutcome) -> str | None:
 
 
 def _reasons(outcome: RunOutcome) -> tuple[str, dict[str, float]]:
-    """Return what is seen at the end of a run whose cut is not as asked, and the figures of it."""
+    """Return what is seen at the end of a run whose cut is not as planned, and its figures."""
     (moved, turned), supports = outcome.motion, outcome.motion_of_supports
     way, cut = outcome.forward_in_tissue, float(length_of_cut(outcome.recording)[-1])
     behind, friction, needed = (

@@ -120,6 +120,6 @@ class GrowingFile:
         self._file.close()
 
     def _cut(self, end: int) -> None:
-        """Make the file that long [bytes], and go on writing there."""
+        """Make the file that long [bytes], and continue there."""
         self._file.truncate(end)
         self._file.seek(end)

@@ -165,10 +165,10 @@ class Checkpoints:
     """Writes a checkpoint every so many frames, and keeps the last two.
 
     While one is written, no other is due. Where the system refuses, that is logged once, the run
-    goes on, and the last whole checkpoint stays.
+    continues, and the last whole checkpoint stays.
 
     Args:
-        folder: Where the files are, and those of an earlier run that goes on.
+        folder: Where the files are, and those of an earlier run that continues.
         every: Frames between two; 0: there are none.
         grown: Names of files that grow with the run: they are on the disk before a checkpoint is.
     """
@@ -182,7 +182,7 @@ class Checkpoints:
         self._has_failed = False
 
     def read(self, *, is_said: bool = False) -> list[Checkpoint]:
-        """Return the whole checkpoints of a run that goes on, the last one first.
+        """Return the whole checkpoints of a run that continues, the last one first.
 
         Args:
             is_said: Whether those that are not whole have been logged; else they are.
@@ -265,7 +265,7 @@ class Checkpoints:
         except OSError as error:
             if not self._has_failed:
                 _log.warning(
-                    "%s: a checkpoint cannot be written (%s); the run goes on, and the last one "
+                    "%s: a checkpoint cannot be written (%s); the run continues, and the last one "
                     "that was written stays",
                     self._folder,
                     error.strerror or error,

@@ -27,7 +27,7 @@ SECONDS_PER_LINE = 5.0
 
 @contextmanager
 def log_to_stderr(options: PrintOptions) -> Iterator[None]:
-    """Send log messages to standard error, from the level that was asked for."""
+    """Send log messages to standard error, from the level that was requested."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_OneLine())
     root = logging.getLogger()
@@ -151,7 +151,7 @@ def print_report(summary: "Summary", prepared: "PreparedRun") -> None:
 
 
 def expect_no_warnings(summary: "Summary", options: RunOutputOptions) -> None:
-    """Check that a run ended without warnings, if that is asked for.
+    """Check that a run ended without warnings, if that is requested.
 
     Raises:
         WarnedError: it did not; the message names their kinds.

@@ -68,7 +68,7 @@ class Explanation(NamedTuple):
     resumed_from: int
     """Number of frames that a checkpoint had; 0: the run was done from its start."""
     answered: bool
-    """Whether the tissue was asked in this frame; if not, its forces are of the last answer."""
+    """Whether the tissue was queried in this frame; if not, its forces are of the last answer."""
     felt: Wrench
     """Wrench that the arm felt."""
     raw: Wrench

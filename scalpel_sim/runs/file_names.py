@@ -15,10 +15,10 @@ RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 """Names of all files that a run can write, besides `STROKE`."""
 
 REPLAY_FRAMES = "replay.part"
-"""The frames of the replay, while the run goes on."""
+"""The frames of the replay, while the run continues."""
 
 JOURNAL = "journal.part"
-"""Notes of the run on itself, while it goes on."""
+"""Notes of the run on itself, while it continues."""
 
 CHECKPOINT_FILES = ("checkpoint_a.bin", "checkpoint_b.bin")
 """Names of the files: each checkpoint replaces the older one."""

@@ -1,4 +1,4 @@
-"""Runs that are shown live in one page, one after the other, as the person there asks."""
+"""Runs that are shown live in one page, one after the other, as the person there requests."""
 
 import logging
 import sys
@@ -39,7 +39,7 @@ _BEGIN = Engage | Choose | Jaws | End | Begin
 """Commands with which a run begins."""
 
 PrepareRun = Callable[[Begin], AbstractContextManager[PreparedRun]]
-"""Prepares the run that a page asks for; its link is closed when that is left."""
+"""Prepares the run that a page requests; its link is closed when that is left."""
 
 
 class _LiveRun(NamedTuple):
@@ -58,7 +58,7 @@ class LiveSession:
     """The page, and the runs in it.
 
     Args:
-        prepare: Prepares a run that the page asks for, until its link is closed.
+        prepare: Prepares a run that the page requests, until its link is closed.
         page: Options of the page.
         device: Options of the device that leads, if one does.
     """
@@ -158,7 +158,7 @@ class LiveSession:
         return self._viewer
 
     def _done(self, run: _LiveRun) -> Summary | None:
-        """Do a run; None where another was asked for before it began."""
+        """Do a run; None where another was requested before it began."""
         assert self._viewer is not None
         prepared, viewer, controls = run.prepared, self._viewer, run.controls
         if run.device is not None:
@@ -174,7 +174,7 @@ class LiveSession:
         return summary
 
     def _is_given_up(self, controls: RunControls) -> bool:
-        """Wait until a page chooses or takes hold; return whether it asks for another run instead.
+        """Wait until a page chooses or takes hold; return whether it requests another run instead.
 
         Raises:
             Interrupted: the user or the system ended the program before.
@@ -200,7 +200,7 @@ class LiveSession:
         return any(isinstance(command, Begin) for command in list(controls.commands))
 
     def _after(self, run: _LiveRun, has_files: bool) -> _LiveRun | None:
-        """Wait until the page asks for another run, and begin it; None: it is not wanted."""
+        """Wait until the page requests another run, and begin it; None: it is not wanted."""
         run.controls.has_ended = True
         while (asked := self._asked_next(run, says=has_files)) is not None:
             has_files = False
@@ -215,7 +215,7 @@ class LiveSession:
         return None
 
     def _asked_next(self, run: _LiveRun, *, says: bool) -> Begin | None:
-        """Wait for what the page asks for next; None on Ctrl-C or where the viewer has ended."""
+        """Wait for what the page requests next; None on Ctrl-C or where the viewer has ended."""
         assert self._viewer is not None
         with StopSignals() as stop:
             if says:  # from now on Ctrl-C ends it without a traceback

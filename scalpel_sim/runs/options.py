@@ -58,7 +58,7 @@ class DeviceOptions:
     """HOST:PORT at which the run waits for the device: any host with a key, else one of this
     machine alone; port 0 for any free one [default: 127.0.0.1:8767]."""
     listen_key: Path | None = None
-    """Let only devices lead that have the key in this file [default: the key in SCALPEL_SIM_KEY,
+    """Only devices may lead that have the key in this file [default: the key in SCALPEL_SIM_KEY,
     if that is set]."""
     watchdog: float | None = None
     "The blade rests when no pose has come for so long, in wall time [s; default: 0.04]."
@@ -79,7 +79,7 @@ class OutputOptions:
     name), .ply (marked on each face) or .stl (triangles alone). May be given several times."""
     checkpoint: float | None = None
     """Every so many seconds of simulated time the whole run is written to its folder, so that one
-    that was killed can go on (run --resume); 0: never [default: 1]."""
+    that was killed can continue (run --resume); 0: never [default: 1]."""
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -88,8 +88,8 @@ class RunOutputOptions(OutputOptions):
     """The files that a run writes, or has written, and how it ends."""
 
     resume: Path | None = None
-    """Go on with the run that was interrupted, or killed, while it wrote to this folder, to the
-    same bits. What is asked for is in the folder: give no other options than --export,
+    """Continue the run that was interrupted, or killed, while it wrote to this folder, to the
+    same bits. What is requested is in the folder: give no other options than --export,
     --checkpoint, --strict, and what is printed."""
     strict: Flag = False
     """End with exit code 4 where the run ended with a warning: a cut that is unfinished, a blade

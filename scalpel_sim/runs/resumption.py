@@ -48,7 +48,7 @@ class Resumption(NamedTuple):
     n_journal: int
     """Length of the journal until there [bytes]."""
     checkpoint: Checkpoint | None
-    """Where the run goes on; None: at its start."""
+    """Where the run continues; None: at its start."""
 
     @property
     def n_frames(self) -> int:
@@ -85,7 +85,7 @@ class Resumption(NamedTuple):
         _log.warning("%s was changed, damaged or removed; it is as it was again%s", path, kept)
 
     def load_into(self, simulation: Simulation) -> None:
-        """Put a simulation, which is at its start, to where the run goes on.
+        """Put a simulation, which is at its start, to where the run continues.
 
         Raises:
             StateError: it was made otherwise than the one that was interrupted.
@@ -105,14 +105,14 @@ def resumption_of(folder: Path) -> Resumption:
     """Return what is there of the run whose files are in a folder. What is damaged is logged.
 
     Raises:
-        UsageError: there is nothing to go on with; the message says why.
+        UsageError: there is nothing to continue; the message says why.
         OSError: a file cannot be read.
     """
     if not folder.is_dir():
         raise UsageError(f"--resume {folder}: there is no such folder")
     has_ended = not any((folder / name).exists() for name in PASSING_FILES)
     if has_ended and _status_in(folder) == COMPLETE:
-        raise UsageError(f"--resume {folder}: that run is complete; there is nothing to go on with")
+        raise UsageError(f"--resume {folder}: that run is complete; there is nothing to continue")
     with Checkpoints(folder) as checkpoints:
         found = checkpoints.read()
     plan, noted = read_journal(folder / JOURNAL)
@@ -121,7 +121,7 @@ def resumption_of(folder: Path) -> Resumption:
         raise UsageError(f"--resume {folder}: {_why_no_scene(folder, plan)}")
     if plan is None:
         _log.warning(
-            "%s: no note of what the run was asked for is whole; it is done as %s says, without "
+            "%s: no note of what was requested of the run is whole; it is done as %s says, without "
             "--export unless that is given again",
             folder,
             SCENE,
@@ -140,7 +140,7 @@ def resumption_of(folder: Path) -> Resumption:
 
 
 def _why_no_scene(folder: Path, plan: RunPlan | None) -> str:
-    """Return why a folder without a `scene.toml` has no run that can go on."""
+    """Return why a folder without a `scene.toml` has no run that can continue."""
     if plan is not None or (folder / INITIAL).exists():
         return (
             f"it has no {SCENE}: the tissue of its run was in another process, or the file was "
@@ -152,7 +152,7 @@ def _why_no_scene(folder: Path, plan: RunPlan | None) -> str:
 
 
 def _expect_recorded(folder: Path, plan: RunPlan | None, last: RunMark) -> None:
-    """Refuse to go on if what a hand did, which the run repeats, is not what it was.
+    """Refuse to continue if what a hand did, which the run repeats, is not what it was.
 
     Raises:
         UsageError: it is not; the message names the file.
@@ -224,7 +224,7 @@ class RepeatedFrames:
     """Frames that are done again, and must be what was recorded.
 
     Args:
-        resumption: What was recorded, and where the run goes on.
+        resumption: What was recorded, and where the run continues.
         folder: Where `forces.csv` is, for messages.
     """
 
@@ -254,7 +254,7 @@ class RepeatedFrames:
             raise RunError(
                 f"{self._folder / FORCES}: frame {len(recording)} is done again, and {name} is "
                 f"{float(now[differs[0]])!r}, not {float(then[differs[0]])!r} as it was: the run "
-                "went on with another version of the program or its libraries, on another "
+                "continued with another version of the program or its libraries, on another "
                 f"machine, or with another mesh or model. Do it again from its {SCENE}"
             )
         recording.cut_back(len(recording) - 1)

@@ -99,7 +99,7 @@ def perform(
         resumption: Files of the run, if it continues from there.
 
     Raises:
-        StateError: a run that goes on is made otherwise than it was.
+        StateError: a run that continues is made otherwise than it was.
         Interrupted: the user or the system ended the run.
         RunError: another run writes there, the run failed, or a file could not be written. The
             other files are.
@@ -146,12 +146,12 @@ def perform(
         is_done = run.status in (COMPLETE, ENDED_IN_PAGE) and not run.attempts.unwritten
         if is_done or not checkpoints.are_there:
             outputs.remove_passing_files()
-    _raise_what_ended_it(run, stop, stopped, can_go_on=checkpoints.are_there and not is_done)
+    _raise_what_ended_it(run, stop, stopped, can_continue=checkpoints.are_there and not is_done)
     return summary
 
 
 def _raise_what_ended_it(
-    run: OpenRun, stop: StopSignals, stopped: str | None, *, can_go_on: bool
+    run: OpenRun, stop: StopSignals, stopped: str | None, *, can_continue: bool
 ) -> None:
     """Raise the first error of a run, or the signal that came, if there was one.
 
@@ -159,7 +159,7 @@ def _raise_what_ended_it(
         run: The run, whose last files were written.
         stop: The signals until the last file was written.
         stopped: The signal that ended the frames.
-        can_go_on: Whether `--resume` goes on from there.
+        can_continue: Whether `--resume` continues from there.
 
     Raises:
         Interrupted: the user or the system ended the run, or wanted to when it had ended.
@@ -169,7 +169,7 @@ def _raise_what_ended_it(
     kept = f"{folder} holds what was done"
     if attempts.unwritten:
         kept += f", but not {', '.join(dict.fromkeys(attempts.unwritten))}"
-    further = f"; --resume {folder} goes on from there" if can_go_on else ""
+    further = f"; --resume {folder} continues from there" if can_continue else ""
     if run.failure is not None:
         is_of_files = isinstance(run.failure.__cause__, OSError)  # what diverged would do so again
         raise RunError(
@@ -186,7 +186,7 @@ def _raise_what_ended_it(
 def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
     """Write what is known before the first frame, and keep space for what comes after the last.
 
-    A run that goes on is put where it was first: what is refused leaves its folder as it is.
+    A run that continues is put where it was first: what is refused leaves its folder as it is.
 
     Args:
         run: At its start.
@@ -194,7 +194,7 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
         seconds: How long the run is to last [s]; None: as long as the hand leads.
 
     Raises:
-        StateError: a run that goes on is made otherwise than it was.
+        StateError: a run that continues is made otherwise than it was.
         RunError: the system refuses, or there is no room for a run.
     """
     simulation, outputs, hand = run.simulation, run.outputs, run.hand
@@ -231,7 +231,7 @@ def _run_frames(
     """Do the frames, and return the error that ended them early.
 
     Args:
-        run: At its start, or where it goes on.
+        run: At its start, or where it continues.
         seconds: How long to simulate [s].
         every_frame: Functions that are called after each frame.
         controls: See `perform`.

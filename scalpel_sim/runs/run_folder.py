@@ -68,7 +68,7 @@ class Outputs:
         folder: The folder; it is made if there is none.
         plotter: Draws the plots. The caller closes it.
         columns: Columns of `forces.csv`; None: those that each run has.
-        resumption: Files of the run, if it goes on from there: then those files stay.
+        resumption: Files of the run, if it continues from there: then those files stay.
 
     Raises:
         UsageError: the path is a file, or lies below one.
@@ -101,13 +101,13 @@ class Outputs:
         return self.folder / name
 
     def remove_earlier_files(self) -> None:
-        """Remove the files that were there; what a run goes on from stays."""
+        """Remove the files that were there; what a run continues from stays."""
         kept = () if self.resumption is None else (SCENE, INITIAL, FORCES, *PASSING_FILES)
         for name in (*PASSING_FILES, *RUN_FILES):
             self._remove(name, is_kept=name in kept)
 
     def remove_passing_files(self) -> None:
-        """Remove what only a run needs that goes on."""
+        """Remove what only a run needs that continues."""
         for name in PASSING_FILES:
             self._remove(name)
 
@@ -237,13 +237,13 @@ class Outputs:
         return [*noted, self._forces, *self._driven.values()]
 
     def _growing(self, name: str, columns: Sequence[str], kept: FileSum = FileSum()) -> GrowingFile:
-        """Begin a file that grows, or go on with what is kept of it."""
+        """Begin a file that grows, or continue with what is kept of it."""
         head = (",".join(columns) + "\n").encode("ascii")
         with writing(self.path(name), _INSTEAD):
             return GrowingFile(self.path(name), head, kept)
 
     def replay_log(self) -> FrameLog:
-        """Return the file of the replay's frames; those of a run that goes on are in it."""
+        """Return the file of the replay's frames; those of a run that continues are in it."""
         kept = FileSum() if self.resumption is None else self.resumption.replay
         with writing(self.path(REPLAY_FRAMES), _INSTEAD):
             return FrameLog(self.path(REPLAY_FRAMES), kept)

@@ -159,7 +159,7 @@ class SolverTable(TomlTable, kw_only=True, frozen=True):
     view]; or hierarchical, the paper's, for springs."""
     mass_scaling: NotNegative = DEFAULT_MASS_SCALING
     """Light nodes, of slivers or near the blade, get mass until none is faster than this angular
-    frequency [1/s; 0: off]. The added mass has no weight, and the table tells how much it is."""
+    frequency [1/s; 0: off]. The added mass has no weight, and the table says how much it is."""
     precision: Text = "single"
     """Precision of the forces of tetrahedra: single, or double, which takes a third longer.
     Positions and velocities are double."""
@@ -199,8 +199,8 @@ class ArmTable(TomlTable, kw_only=True, frozen=True):
     torque: Positive | None = None
     """Largest torque [N m]; any without."""
     tissue_every: Every = 1
-    """Ask the tissue once in so many milliseconds; in between the arm feels its last answer and its
-    local stiffness."""
+    """Query the tissue once in so many milliseconds; in between the arm feels its last answer and
+    its local stiffness."""
     coupling: Text = "rigid"
     """How the arm's blade is coupled to the one that cuts: rigid, they are one; or virtual, by a
     spring and a damper, and the arm feels nothing stiffer."""

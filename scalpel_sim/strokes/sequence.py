@@ -29,7 +29,7 @@ def in_turn(
     """Return one stroke that does several, and rests before and after each.
 
     From stroke to stroke the blade is drawn out along its edge if it is in the body, raised above
-    it, led over, and let down. It is as long as the longest of the strokes needs; its tip is where
+    it, led over, and lowered. It is as long as the longest of the strokes needs; its tip is where
     each says.
 
     Args:

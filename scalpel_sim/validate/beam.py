@@ -1,7 +1,7 @@
 """A bar: clamped, its sag and the period of its swing; free, its stiffness and its swing.
 
-The clamped bar sags under its weight and under a load at its tip, and swings when the load is let
-go. How far and how fast follows from Timoshenko's beam (`bar.beam_theory`), for sections that
+The clamped bar sags under its weight and under a load at its tip, and swings when the load is
+released. How far and how fast follows from Timoshenko's beam (`bar.beam_theory`), for sections that
 nothing hinders, and from linear elasticity for the clamped solid (`clamped_solid`). The difference
 of the two is the clamp. The free bar has none: bent by couples at its ends it has the curvature of
 the couple over E I, whatever its Poisson's ratio, which is the exact solution of three-dimensional
@@ -67,7 +67,7 @@ class BarMotion(NamedTuple):
     sag_of_load: float
     """Deflection of the tip under a load there, as large as the weight [m]."""
     period: float
-    """Period of the swing after the load is let go [s]."""
+    """Period of the swing after the load is released [s]."""
     time: FloatArray
     """Times of the swing [s]."""
     height: FloatArray
@@ -75,7 +75,7 @@ class BarMotion(NamedTuple):
 
 
 def swing(poisson_ratio: float, across: int) -> BarMotion:
-    """Load the clamped bar, let it go, and follow its swing.
+    """Load the clamped bar, release it, and follow its swing.
 
     Args:
         poisson_ratio: Poisson's ratio of the bar.
@@ -161,13 +161,13 @@ def measure_beam(quick: bool) -> Findings:
         curves.append(Curve("", 1e3 * fine.time, 1e3 * height, is_theory=True))
         if ratio > 0.0:  # else nothing narrows
             notes.append(_note_of_clamp(ratio, solid, theory))
-    plot = Plot("The tip of a bar that is let go", "time [ms]", "height of the tip [mm]", curves)
+    plot = Plot("The tip of a bar that is released", "time [ms]", "height of the tip [mm]", curves)
     free_checks, free_plot = _free_bars(ratios)
     return Findings(checks + free_checks, [plot, free_plot], notes)
 
 
 def _free_bars(ratios: Sequence[float]) -> tuple[list[Check], Plot]:
-    """Bend bars without supports, and let them go."""
+    """Bend bars without supports, and release them."""
     checks, curves = [], []
     for ratio in ratios:
         bars = [bent_and_let_go(ratio, across) for across in CELLS_ACROSS]
@@ -196,7 +196,7 @@ def _note_of_clamp(poisson_ratio: float, solid: ClampedSolid, theory: BeamTheory
 
 
 def bent_and_let_go(poisson_ratio: float, across: int) -> FreeBar:
-    """Bend a bar by couples at its ends, let it go, and follow its swing.
+    """Bend a bar by couples at its ends, release it, and follow its swing.
 
     Args:
         poisson_ratio: Poisson's ratio of the bar.

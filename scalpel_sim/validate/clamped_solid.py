@@ -1,6 +1,6 @@
 """The clamped bar as a solid of three dimensions, by elements that are not the engine's.
 
-Beam theory lets every section narrow and widen as Poisson's ratio asks for. A clamp hinders the
+Beam theory lets every section narrow and widen as Poisson's ratio requires. A clamp hinders the
 section that it holds, and the bar is stiffer: by how much follows from linear elasticity alone.
 Here that is solved with hexahedra whose displacements are quadratic along each axis. The grid is
 one of products, so that every matrix is a sum of Kronecker products of those of one axis. It is

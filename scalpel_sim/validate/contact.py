@@ -62,7 +62,7 @@ def hertz_force(depth: float, poisson_ratio: float) -> float:
 
 
 def press_sphere(poisson_ratio: float, cell: float, depths: list[float]) -> Indentation:
-    """Press the sphere into a half-space, and let it come to rest at each depth.
+    """Press the sphere into a half-space, until it is at rest at each depth.
 
     Args:
         poisson_ratio: Poisson's ratio.

@@ -1,4 +1,4 @@
-"""Coupling to an arm: a hand that presses, lets go or taps gains no energy from the tissue."""
+"""Coupling to an arm: a hand that presses, releases or taps gains no energy from the tissue."""
 
 import itertools
 from typing import NamedTuple
@@ -17,12 +17,12 @@ _LINES = lines_of("coupling")
 _LEAST_SHARE = 0.05
 """Share of all energy put in from which on the share that came back is looked at."""
 _AFTERWARDS = 0.2
-"""How long the hand holds, lets go, or taps after the press [s]."""
+"""How long the hand holds, releases, or taps after the press [s]."""
 _TAP_DISTANCE = 6e-3
 """How far a tap withdraws the blade [m]."""
 _TAP_RATE = 10.0
 """Taps per second [Hz]."""
-_HANDS = ("holds", "lets go", "taps")
+_HANDS = ("holds", "releases", "taps")
 """What the hand does after the press."""
 _PRESS = changed(
     SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, preset="touch", speed=0.2
@@ -58,7 +58,7 @@ def _press(hand: str, every: int) -> _Press:
 
     simulation.pictures.append(observe)
     simulation.run(pressed)
-    if hand == "lets go":
+    if hand == "releases":
         simulation.arm.model.actuator_gainprm[simulation.arm.hand.actuators] = 0.0
         simulation.arm.model.actuator_biasprm[simulation.arm.hand.actuators] = 0.0
     simulation.run(pressed + _AFTERWARDS)
@@ -153,7 +153,7 @@ def _axes(pose: FloatArray) -> FloatArray:
 def measure_coupling(quick: bool) -> Findings:
     """Press with an answer of the tissue every 1, 5, 10 and 33 ms."""
     checks, curves, notes = [], [], []
-    for hand in ("lets go",) if quick else _HANDS:
+    for hand in ("releases",) if quick else _HANDS:
         for every in (1, 33) if quick else (1, 5, 10, 33):
             simulation, energy, work = _press(hand, every)
             counters = simulation.bridge.counters.passivity
@@ -164,8 +164,8 @@ def measure_coupling(quick: bool) -> Findings:
                 f"The hand {hand}, every {every} ms: up to {force:.2f} N; the controller acted in "
                 f"{counters.frames} frames and took {counters.injected_away * _UJ_PER_J:.3g} µJ"
             )
-            if hand == "lets go":
+            if hand == "releases":
                 time: FloatArray = np.linspace(0.0, simulation.time, len(energy))
                 curves.append(Curve(f"answer every {every} ms", time, energy * _UJ_PER_J))
-    title = "Energy that a Touch has put into tissue; the hand lets go"
+    title = "Energy that a Touch has put into tissue; the hand releases"
     return Findings(checks, [Plot(title, "time [s]", "energy [µJ]", curves)], notes)

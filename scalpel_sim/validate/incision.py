@@ -24,7 +24,7 @@ _FINER = 0.75
 """Edge of the lattice of the finer mesh, per that of the mesh of the scene: 11,708 tetrahedra for
 5,136."""
 _FIRST_CUT = 0.01
-"""Area that counts as the first cut, as a share of the area asked for. From 0.5 to 3 % of it lie 2
+"""Area that counts as the first cut, as a share of the area planned. From 0.5 to 3 % of it lie 2
 mm of travel."""
 _STEADY = (0.3, 0.6, 0.9)
 """Shares of the travel: from the first on the cut is steady, and from the first to the second and
@@ -53,7 +53,7 @@ class DrawnIncision(NamedTuple):
     opened: FloatArray
     """Area that the mesh has opened so far [m2], shape (n,)."""
     asked: float
-    """Area that is asked for [m2]."""
+    """Area that is planned [m2]."""
     paid_at_end: float
     """Area that the blade has paid for when the blade is out [m2]."""
     opened_at_end: float

@@ -47,14 +47,14 @@ def wanted_of(line: bytes) -> Wanted | None:
 
 
 class Colouring:
-    """Keeps what each page shows, and tells the run where the sum of it changes.
+    """Keeps what each page shows, and reports to the run where the sum of it changes.
 
     Args:
-        tell: Tells the run.
+        report: Reports it to the run.
     """
 
-    def __init__(self, tell: Callable[[Wanted], None]) -> None:
-        self._tell = tell
+    def __init__(self, report: Callable[[Wanted], None]) -> None:
+        self._report = report
         self._chosen: dict[Hashable, SurfaceQuantity] = {}
         self._told = Wanted(())
 
@@ -66,7 +66,7 @@ class Colouring:
         wanted = Wanted(tuple(sorted(set(self._chosen.values()))))
         if wanted != self._told:
             self._told = wanted
-            self._tell(wanted)
+            self._report(wanted)
 
     def remove(self, page: Hashable) -> None:
         """Forget a page that was closed."""

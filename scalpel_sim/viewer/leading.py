@@ -28,7 +28,7 @@ def is_own_page(host: str, origin: str | None) -> bool:
     """Return whether a page came from this server, by what its browser says.
 
     Args:
-        host: Name and port by which it asked for this server.
+        host: Name and port by which it requested this server.
         origin: Where its browser says that the page came from; None where it says nothing.
     """
     return origin is not None and hmac.compare_digest(
@@ -46,7 +46,7 @@ class LeadingPage(Protocol):
 class Leadership:
     """Passes on what the page that leads says, and drops all else.
 
-    The first page that comes leads. Another may take over once that one has let go of the blade or
+    The first page that comes leads. Another may take over once that one has released the blade or
     has been closed.
 
     Args:
@@ -73,7 +73,7 @@ class Leadership:
         """Return whether a page came from this server: by what its browser says, and by its token.
 
         Args:
-            host: Name and port by which it asked for this server.
+            host: Name and port by which it requested this server.
             origin: Where its browser says that the page came from; None where it says nothing.
             token: What it gave as the token.
         """
@@ -87,7 +87,7 @@ class Leadership:
         self._tell()
 
     def remove(self, page: LeadingPage) -> None:
-        """Forget a page that was closed; if it led, the hand lets go."""
+        """Forget a page that was closed; if it led, the hand releases."""
         if self._pages.pop(page, None) is None:
             return
         if page is self._leader:

@@ -119,7 +119,7 @@ class RunState(
     has_ended: bool = False
     """Whether the page has ended it."""
     notice: str = ""
-    """What the person is told."""
+    """The message to the person."""
 
 
 class LiveState(NamedTuple):

@@ -40,7 +40,7 @@ LOOPBACK = "127.0.0.1"
 """The only address that is listened on: no other machine can see the run or slow it down."""
 
 OWN_NAMES = r"(127\.0\.0\.1|localhost)"
-"""Host names that a browser may ask for. Another name that resolves to this address gets a 404."""
+"""Host names that a browser may request. Another name that resolves to this address gets a 404."""
 
 FIRST_PORT = 7000
 """First port that is tried, the same as meshcat's."""
@@ -71,8 +71,8 @@ MOST_UNSENT = 8
 """Messages at most that a page's socket holds because the page does not read them."""
 
 SECONDS_TO_ANSWER = 10.0
-"""How often a page is asked whether it reads, and how long its browser may take to answer [s]. The
-browser answers for a page that is hidden, or that is stopped in a debugger."""
+"""How often a page is pinged to see whether it reads, and how long its browser may take to answer
+[s]. The browser answers for a page that is hidden, or that is stopped in a debugger."""
 
 LARGEST_MESSAGE = 1 << 14
 """Largest message of a page [byte]: commands have some hundred."""

@@ -238,7 +238,7 @@ class Viewer:
                 self._pipe.close()
 
     def _listen(self, controls: PageControls | None) -> None:
-        """Receive what pages want to see, and commands, until the process ends; then let go."""
+        """Receive what pages want to see, and commands, until the process ends; then release."""
         for line in cast(IO[bytes], self._process.stdout):
             wanted = wanted_of(line)
             if wanted is not None:

@@ -23,7 +23,7 @@ MOST_LOST = 100
 SAID = re.compile(
     r"error: interrupted by SIG(INT|TERM)"
     r"( before the run began; no file was written"
-    r"| after [\d.]+ s; \S+ holds what was done(; --resume \S+ goes on from there)?"
+    r"| after [\d.]+ s; \S+ holds what was done(; --resume \S+ continues from there)?"
     r"| when the run was complete; \S+ holds what was done)?$"
 )
 """Messages of a run that a signal ended."""

@@ -2,7 +2,7 @@
 
 A force at a point moves a fine mesh further than a coarse one. If the nodes that a cut inserts at
 the edge bore the pull of the anchors at once, the tissue there would jump ahead: the force dropped
-by up to 35 %, and damping took 7 % of the work. So the tetrahedron goes on holding the anchor
+by up to 35 %, and damping took 7 % of the work. So the tetrahedron continues to hold the anchor
 through the nodes that it had, as if it were whole, until the anchor has slipped out of it.
 """
 

@@ -245,7 +245,7 @@ def _three_numbers(part: npt.ArrayLike) -> Vec3 | None:
     if array.shape != (3,):
         return None
     x, y, z = array.tolist()
-    # A sum is finite only where all are, and is faster to ask.
+    # A sum is finite only where all are, and is faster to test.
     is_finite = math.isfinite(x + y + z) or all(map(math.isfinite, (x, y, z)))
     return Vec3(x, y, z) if is_finite else None
 

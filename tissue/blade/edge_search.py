@@ -153,7 +153,7 @@ def _runs_in_slit(
     ahead: Vec3,
     reach: float,
 ) -> bool:
-    """Return whether a sample is in a slit that goes on ahead of it, one cut before.
+    """Return whether a sample is in a slit that continues ahead of it, one cut before.
 
     Just ahead of a crack front is a slit too, the one that is being cut: it ends there.
 

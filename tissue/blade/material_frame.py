@@ -89,7 +89,7 @@ def find_sheets(anchors: Anchors, body: Body, apart: float) -> None:
     """Find the sheets that the samples hold, and how each is turned.
 
     Samples that follow each other along the edge hold the same sheet unless their material points
-    are far apart, or there is a long gap between them. A single sample may let go for an instant;
+    are far apart, or have a long gap between them. A single sample may be released for an instant;
     that does not part a sheet.
 
     Args:

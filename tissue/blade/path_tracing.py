@@ -150,7 +150,7 @@ def _follow_anchor(
         store(path.t1, k, at)
     elif not path.known[k]:
         store(path.t1, k, _behind(body, at, margin, ahead, path.seed[k]))
-    # Where the blade backs off, the cut surface does not go on.
+    # Where the blade backs off, the cut surface does not continue.
     if (
         anchors.state[k] == LEFT
         and dot(sample_displacement(edge, k, len(anchors.state)), pose.forward) > 0.0

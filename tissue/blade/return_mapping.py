@@ -259,7 +259,7 @@ def _slip_anchor(
     """Slip an anchor back to the yield limit; count the work.
 
     Slip takes energy from the spring of the anchor. Where it would store much, the search has come
-    to the other lip of a cut that gapes, and the anchor lets go instead.
+    to the other lip of a cut that gapes, and the anchor is released instead.
 
     Args:
         blade: Anchors and totals are written.

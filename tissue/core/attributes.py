@@ -22,7 +22,7 @@ _USUAL: dict[type, _Defaults] = {}
 def attributes_of(value: Any) -> dict[str, Any]:
     """Return the attributes of an object by their names.
 
-    Names are those in the code of its class. What the object refers to tells whether these are all;
+    Names are those in the code of its class. What the object refers to shows whether these are all;
     if not, its dictionary is read.
     """
     kind = type(value)

@@ -53,7 +53,7 @@ def first_slot(table: HashTable, hashed: int) -> int:
 
 @kernel
 def next_slot(table: HashTable, slot: int) -> int:
-    """Return the slot in which a search goes on."""
+    """Return the slot in which a search continues."""
     return (slot + 1) & (len(table.item) - 1)
 
 

@@ -79,7 +79,7 @@ class _Locator(caching._CacheLocator):
         return _digest_of(self._file)
 
     def get_disambiguator(self) -> str:
-        """Return the function's line, which tells apart two of the same name."""
+        """Return the function's line, which distinguishes two of the same name."""
         return str(self._line)
 
 

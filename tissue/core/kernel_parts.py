@@ -294,8 +294,8 @@ def shortcuts() -> Iterator[None]:
     """Compile without what is done twice or for nobody. Blocks may be nested; one thread compiles.
 
     For each `a + b` Numba tries some eighty implementations one after the other, once to find the
-    type and once to find the code. Here the signature is remembered. And Numba tells each function
-    that is being compiled of each call of LLVM, for a sum of times that nobody reads.
+    type and once to find the code. Here the signature is remembered. Numba reports to each function
+    that is being compiled each call of LLVM, for a sum of times that nobody reads.
     """
     lock = llvm.ffi.lib._lock
     listeners, lock._cblist = lock._cblist, []

@@ -59,7 +59,7 @@ def keeps_views(value: tuple[Any, ...]) -> bool:
 
 
 def plain_class(kind: type) -> type:
-    """Return the named tuple of which a class makes fields when they are asked for, or itself."""
+    """Return the named tuple of which a class makes fields when they are read, or itself."""
     is_lazy = any(isinstance(each, _LazyField) for each in vars(kind).values())
     return kind.__mro__[1] if is_lazy else kind
 

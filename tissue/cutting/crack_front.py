@@ -247,7 +247,7 @@ def _join(cut: Cut, start: int, stop: int) -> None:
                 best, best_when, best_weights = smallest, when, w
                 b, c, d = p, q, r
         if best < -OUTSIDE_TOLERANCE or best_when >= 1.0:
-            return  # the segment leaves the body: the front goes on from `stop`
+            return  # the segment leaves the body: the front continues from `stop`
         node = insert_in_face(cut, b, c, d, best_weights)
         if node < 0:
             return

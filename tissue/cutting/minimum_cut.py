@@ -157,7 +157,7 @@ def _fill_paths(graph: FlowGraph, body: Body, visits: Visits, source: int, limit
     Args:
         graph: Levelled; the flow is written.
         body: The tissue.
-        visits: Tells which tetrahedra were visited.
+        visits: Marks which tetrahedra were visited.
         source: A tetrahedron of lip +1.
         limit: Flow above which the search ends [m2].
     """
@@ -185,7 +185,7 @@ def _fill_paths(graph: FlowGraph, body: Body, visits: Visits, source: int, limit
 
 @kernel
 def _next_half(graph: FlowGraph, body: Body, visits: Visits, t: int) -> int:
-    """Return the face of `t` through which a shortest path may go on, -1 if there is none."""
+    """Return the face of `t` through which a shortest path may continue, -1 if there is none."""
     while graph.next_face[t] < 4:
         f: int = graph.next_face[t]
         link = body.links[t, f]

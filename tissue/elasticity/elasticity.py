@@ -130,7 +130,7 @@ class Elasticity:
         Args:
             body: Positions of the nodes.
             visits: For searches.
-            limit: It need not be nearer to the truth than the number of steps asks for.
+            limit: It need not be nearer to the truth than the number of steps requires.
         """
         if not self._has_solid:
             return 0.0

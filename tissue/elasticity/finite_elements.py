@@ -36,7 +36,7 @@ VOLUME, N_SHAPE = 9, 10
 grad N_2 and grad N_3; grad N_0 is minus their sum."""
 
 STAR_POOL_MARGIN = LARGEST_STAR + WIDTH
-"""Free slots below which `build_stars` asks for a larger pool; more than any one row needs."""
+"""Free slots below which `build_stars` requests a larger pool; more than any one row needs."""
 
 LARGEST_RING = 3 * LARGEST_STAR + 1
 """Nodes of the tetrahedra around one node at most, itself among them."""

@@ -2,7 +2,7 @@
 
 A cut leaves slivers, whose nodes have next to no mass and whose fastest modes live on one or two of
 them. Explicit dynamics slows such modes by added mass where they are faster than the motion that is
-asked for (selective mass scaling; Belytschko, Liu and Moran, Nonlinear Finite Elements, 6.3). The
+requested (selective mass scaling; Belytschko, Liu and Moran, Nonlinear Finite Elements, 6.3). The
 added mass is moved and has no weight: equilibrium is the same.
 """
 

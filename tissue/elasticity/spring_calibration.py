@@ -1,4 +1,4 @@
-"""The elastic constants of springs on a given mesh, and springs as stiff as asked for.
+"""The elastic constants of springs on a given mesh, and springs as stiff as requested.
 
 No choice of stiffnesses makes springs along the edges of an irregular mesh an exact elastic body
 (Baudet et al. 2009 for van Gelder's): they are off by some 20 % in Young's modulus, have a
@@ -88,7 +88,7 @@ def spring_error(mesh: TetrahedralMesh, material: Material) -> SpringError:
 
     Args:
         mesh: The body at rest.
-        material: The material asked for.
+        material: The material requested.
     """
     mesh = mesh_arrays(mesh)
     stiffness = stiffness_matrix(mesh, material)
@@ -110,7 +110,7 @@ def spring_error(mesh: TetrahedralMesh, material: Material) -> SpringError:
 
 
 def calibrated(mesh: TetrahedralMesh, material: Material) -> Material:
-    """Return the material with springs such that this mesh has the Young's modulus asked for.
+    """Return the material with springs such that this mesh has the Young's modulus requested.
 
     One factor on all springs (`MassSpring.calibration`), found by the secant method on the
     relaxed modulus of `spring_error`. The Poisson's ratio of the mesh and its anisotropy stay as

@@ -40,7 +40,7 @@ NO_LENGTH = 1e-300
 spring and between nodes that coincide."""
 
 SPRING_POOL_MARGIN = LARGEST_STAR + WIDTH
-"""Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
+"""Free slots below which `build_rows` requests a larger pool; more than any one row needs."""
 
 
 class Springs(Arrays):

@@ -15,7 +15,7 @@ S is the second Piola-Kirchhoff stress of the shear part of the law, p its press
 relaxes: shear and pressure.
 
 R and r are constant while an integrator takes its steps, so that the stages of these see an elastic
-body. After each increment of the time step both go on by its length, by the exact solution where
+body. After each increment of the time step both continue by its length, by the exact solution where
 the tissue is held. R then stands for the middle of the next increment, which makes the whole of
 second order.
 
@@ -55,7 +55,7 @@ def prepare_relaxation(solid: Solid, seconds: float) -> None:
 
 @kernel
 def relax_blocks(solid: Solid, begin: int, end: int) -> None:
-    """Let the stress of the blocks of tetrahedra from `begin` to `end` relax where they are.
+    """Relax the stress of the blocks of tetrahedra from `begin` to `end` where they are.
 
     After `prepare_relaxation`, `displacement_gradients` and, where volumes are averaged,
     `pressures`.

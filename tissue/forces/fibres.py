@@ -379,7 +379,7 @@ def report_fibres(
         force = force_at(fibres, p, bend, x, end)
         bent = _bent(fibres, p, x, bend, end)
         along = norm(add(bent.to_point, bent.to_end))
-        # A fibre that is being cut pulls no harder when the blade goes on.
+        # A fibre that is being cut pulls no harder when the blade continues.
         is_cut = norm(force) >= (1.0 - _ROUNDING) * _resistance(fibres, p)
         stiffness = 0.0 if is_cut else fibres.stiffness[p] * along * along
         report_fibre(report, pose, bend, scale(-1.0, force), stiffness)

@@ -4,7 +4,7 @@ One loop of steps for every method that moves all nodes together (`tissue.integr
 
 Each call from Python costs 1 to 4 us, more where the body has filled the cache since the last one:
 with a call for each stage an increment took 40 to 60 us besides what the body costs. Where a stage
-needs room, a call returns; after room was made the next call goes on with that stage.
+needs room, a call returns; after room was made the next call continues with that stage.
 """
 
 from typing import Final, NamedTuple
@@ -75,7 +75,7 @@ class Relaxation(Arrays, two_precisions=True):
     """Everything that the relaxation of an increment reads and writes."""
 
     stage: IntCell
-    """Where the next call goes on."""
+    """Where the next call continues."""
     has_faces: IntCell
     """1 if the blade has side faces, 0 for a line that cuts."""
     step: StepContext
@@ -210,7 +210,7 @@ def _begin(relaxation: Relaxation, edge: Edge, has_blade: bool, part: _Part) -> 
 
 @kernel
 def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int:
-    """Do what follows the steps; return RELAXED, or what went wrong, or what needs room."""
+    """Run what follows the steps; return RELAXED, or what went wrong, or what needs room."""
     step, choice = relaxation.step, relaxation.choice
     if relaxation.stage == _STEPS:
         relaxation.stage = FIND_CONTACTS

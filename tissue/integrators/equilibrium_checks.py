@@ -149,7 +149,7 @@ def gone_too_far(
     x, y, z = begin
     found = (
         f"the body cannot come to rest: node {node}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, has gone "
-        f"{distance:.3g} m and goes on."
+        f"{distance:.3g} m and continues."
     )
     piece = _loose_piece(system, node)
     if not len(piece):

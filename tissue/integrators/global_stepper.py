@@ -89,7 +89,7 @@ class GlobalStepper:
         if outcome == UNSTABLE:
             choice = arrays.choice
             raise UnstableError(
-                f"it would take {choice.needed:.2g} steps of the integrator to go on, where "
+                f"it would take {choice.needed:.2g} steps of the integrator to continue, where "
                 f"tissue at rest takes {math.ceil(choice.at_rest)}"
             )
         if outcome == NOT_FINITE:
@@ -124,7 +124,7 @@ class GlobalStepper:
     def arrays(self, system: TissueModel, blade: BladeContext, stage: int = 0) -> Relaxation:
         """Return the arrays as one struct; another one where an owner has replaced its own.
 
-        `stage`: where an increment goes on that lacked room.
+        `stage`: where an increment continues that lacked room.
         """
         contact, choice = system.contact, self._choice_for(system)
         parts = system.context, choice, blade, contact.search

@@ -72,5 +72,5 @@ class UnstableError(TissueError):
 
 
 def not_finite() -> UnstableError:
-    """Return the error that tells that a position is not a finite number."""
+    """Return the error that says that a position is not a finite number."""
     return UnstableError("the position of a node is not a finite number")

@@ -49,7 +49,7 @@ pinched, is as much shorter within a frame of eight steps as an element is long.
 MOTION_BETWEEN_STRAIN_BOUNDS: Final = 0.001
 """How far a node may move from one bound to the next where there are more steps between them, as a
 share of the node size: some percent of the least altitude of slivers. With 0.01 slivers of the
-organ went on trembling at 0.06 m/s a second after ten strokes; with this they are at rest. A bound
+organ kept trembling at 0.06 m/s a second after ten strokes; with this they are at rest. A bound
 takes as long as half a step: without this a body at rest would be evaluated as often as one that
 swings."""
 
@@ -89,7 +89,7 @@ class StepChoice(Arrays):
     n_steps: IntCell
     """Steps of the part that is taken next."""
     refinement: IntCell
-    """How many times as many steps are taken as motion and stability ask for."""
+    """How many times as many steps are taken as motion and stability require."""
     is_at_rest: IntCell
     """1 while the body is not moved, as it was nearly at rest and nothing touches it, else 0."""
     is_unstable: IntCell

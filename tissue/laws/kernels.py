@@ -87,7 +87,7 @@ def stretch_energy(law: EnergyDensity, q: Lanes) -> Lanes:
         b = splat(law.exponent, q)
         x = _exponent(law, positive)
         grown = exponential_less_one(x)
-        # Beyond the largest exponent, and where q is negative, w goes on along its tangent.
+        # Beyond the largest exponent, and where q is negative, w continues along its tangent.
         return (grown + (grown + splat(1.0, q)) * (b * q - x)) / b
     second, third = splat(law.second, q), splat(law.third, q)
     return q + positive * positive * (second + third * positive)

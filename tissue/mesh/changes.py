@@ -51,7 +51,7 @@ class Change(Arrays):
     n_children: IntCell
     """Number of entries in `children`."""
     is_full: IntCell
-    """1 if the pass stopped for want of room in the body, to go on after some is made; else 0."""
+    """1 if the pass stopped for lack of room in the body, to continue once some is made; else 0."""
     lacks_room: IntCell
     """LISTS or NODES where there was no room, and something is missing; else 0. What was done is of
     no use then: it is done again from where the step began, with more room."""

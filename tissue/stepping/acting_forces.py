@@ -278,7 +278,7 @@ def _forces_of_geoms(stages: StepStages) -> Iterator[ActingForce]:
             float(np.linalg.norm(contacts.friction[i])),
             -float(arrays.gap[c]),
             float(arrays.geoms.friction[g]) * float(contacts.normal_force[i]),
-            "sticks" if arrays.sticks[c] else "slides" if arrays.touches[c] else "has let go",
+            "sticks" if arrays.sticks[c] else "slides" if arrays.touches[c] else "is released",
         )
 
 

@@ -126,7 +126,7 @@ class CheckedSteps:
                 self._stages.make_more_room(error.lacking)
 
     def _try(self, inputs: StepInputs) -> tuple[StepResult | None, str]:
-        """Do a step after a look; return its result, or None and what was wrong with it."""
+        """Do a step after a test; return its result, or None and what was wrong with it."""
         stages = self._stages
         try:
             result = stages.advance(inputs.sweep, inputs.dt)

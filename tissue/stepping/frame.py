@@ -1,7 +1,7 @@
 """The begin of a time step in one call: checks, edge, number of increments.
 
 Each call from Python costs 1 to 4 us. Where the begin needs something, a call returns; the next one
-goes on behind it.
+continues behind it.
 """
 
 import math

@@ -25,7 +25,7 @@ it is found. Less: see `SHARE_UNEXPLAINED`."""
 SHARE_UNEXPLAINED = 0.5
 """The same as a share of the energy that there was and of what was done and taken since. The
 account of energy is exact to some percent; the elastic energy now, which is taken to be 0 here so
-that a step needs no look at the elements, is what makes the bound wide."""
+that a step needs no pass over the elements, is what makes the bound wide."""
 
 SPEED_GAINED = 10.0
 """Speed that a node may gain in a step, per speed of waves: at one already, tissue would be crushed
@@ -87,13 +87,13 @@ class StepWatch:
         self._write_look, self._judge = SameTypes(write_look), SameTypes(judge_step)
 
     def look(self, context: StepContext) -> None:
-        """Look at the body before a step."""
+        """Examine the body before a step."""
         self._write_look.call(context, self._bounds.before)
 
     def begin(
         self, context: StepContext, edge: Edge, when: float, work_of_loads: float, residual: float
     ) -> None:
-        """Look at the body before a step, and count from now on what it is given.
+        """Examine the body before a step, and count from now on what it is given.
 
         Args:
             context: The body and all that acts on it.
@@ -112,7 +112,7 @@ class StepWatch:
     def fault(
         self, context: StepContext, dt: float, work_of_loads: float, residual: float, force: float
     ) -> str | None:
-        """Return what is wrong with a step since the last look; None: nothing.
+        """Return what is wrong with a step since it was last examined; None: nothing.
 
         Args:
             context: The body after it, and all that acts on it.
@@ -176,7 +176,7 @@ class StepBounds(Arrays):
 
 @kernel
 def write_look(context: StepContext, out: FloatArray) -> None:
-    """Look at the body; it costs one pass over the nodes.
+    """Examine the body; it costs one pass over the nodes.
 
     Args:
         context: The body and all that acts on it.

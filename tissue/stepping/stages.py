@@ -176,7 +176,7 @@ class StepStages:
         return n * self.global_stepper.refinement, travel
 
     def _settle(self, outcome: int, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
-        """Do what the begin of a step needs, or refuse the step; see `begin_frame`."""
+        """Run what the begin of a step needs, or refuse the step; see `begin_frame`."""
         model = self.model
         if outcome == NOT_FINITE_BEFORE:
             raise UnstableError(FAULT_BEFORE)

@@ -109,7 +109,7 @@ def _drawn_to(withdrawn_at: float, way: float, drag: float) -> float:
     """Return where the tip goes out, as a share of the body's length.
 
     Args:
-        withdrawn_at: Where it is asked to.
+        withdrawn_at: Where it is planned to.
         way: 1 if it is drawn towards the far end of the body, -1 if towards the near one.
         drag: How far the edge runs ahead of the material, as a share of the body's length.
     """

@@ -264,7 +264,7 @@ class _Recorder:
         self.rows: list[list[float]] = []
 
     def note(self, result: StepResult) -> None:
-        """Take note of a step; the force on the blade is averaged over those of a row."""
+        """Record a step; the force on the blade is averaged over those of a row."""
         self._blade_forces.append(result.wrench.force.copy())
 
     def add_row(self, time: float, result: StepResult | None) -> None:

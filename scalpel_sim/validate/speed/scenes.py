@@ -27,7 +27,7 @@ _ABOUT = (
 
 
 def checked_scene_names(names: Sequence[str]) -> list[str]:
-    """Return the names of the scenes asked for, all where none is named.
+    """Return the names of the scenes requested, all where none is named.
 
     Raises:
         UsageError: there is no scene of that name.

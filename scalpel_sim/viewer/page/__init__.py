@@ -40,7 +40,7 @@ PAGE_HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-"""Headers of every answer: the page is for nobody but who asked for it."""
+"""Headers of every answer: the page is for nobody but who requested it."""
 
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 
@@ -60,7 +60,7 @@ def live_page(
         caption: Text below the heading.
         token: What the page shows the server so as to control the run; None: it controls nothing.
         is_led: Whether the page leads the blade, too.
-        choices: What the page may ask for in the next run.
+        choices: What the page may request in the next run.
 
     Raises:
         RunError: meshcat's viewer was not found.

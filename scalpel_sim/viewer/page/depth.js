@@ -2,7 +2,7 @@
 // in one place.
 "use strict";
 
-const LOOK_EVERY = 250; // [ms]: a look takes a millisecond or two for the surface of an organ
+const LOOK_EVERY = 250; // [ms]: a reading takes a millisecond or two for the surface of an organ
 const NEAR_ENOUGH = 2e-3; // [m]: the last of the way is seen by the shadow, and felt
 const HINT_STEP = 5; // [mm]: a hint that changed with each picture could not be read
 

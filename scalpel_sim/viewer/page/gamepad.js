@@ -1,5 +1,5 @@
 // A gamepad that leads the chosen instrument, by the browser's Gamepad API. Left stick: in the plane of
-// the screen. Right stick: up and down the depth, sideways turns. A: lets go while it is pressed. B or the
+// the screen. Right stick: up and down the depth, sideways turns. A: releases while it is pressed. B or the
 // right trigger: closes the jaws, or opens them. X: chooses the next instrument.
 "use strict";
 

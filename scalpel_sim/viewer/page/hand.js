@@ -2,7 +2,7 @@
 "use strict";
 
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
-const SILENT_AFTER = 1600; // silence after which the run may have let go [ms]
+const SILENT_AFTER = 1600; // silence after which the run may have released [ms]
 const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
 const LONGEST_STEP = 5000; // and at most, where no picture shows it
 const N_LAGS_SHOWN = 30; // of which the median is shown
@@ -50,7 +50,7 @@ class Hand {
         return this.run.leads && this.tip !== null && !this.isClutchOpen && !this.hasEnded;
     }
 
-    // Let go, and do not wait for what was asked: the run goes on from elsewhere.
+    // Release, and do not wait for what was requested: the run continues from elsewhere.
     forget() {
         this.letGoOfAll();
         this.unshown = [];
@@ -189,7 +189,7 @@ class Hand {
         if (this.run.socket === null || this.tip === null) return "";
         if (!this.run.leads) return "Another tab leads the blade.";
         if (this.isClutchOpen) return `Drags turn the view. Space: lead the ${noun} again.`;
-        if (this.run.isPaused) return "Time stands still: press \"go on\", or K";
+        if (this.run.isPaused) return "Time stands still: press \"continue\", or K";
         if (this.hasMoved) return this.depth.hint(this.tip);
         return `Press on the picture and drag: the ${noun} follows`;
     }

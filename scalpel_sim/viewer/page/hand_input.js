@@ -1,4 +1,4 @@
-// Mouse, touch, wheel and keys that lead the blade. Each tells the hand how far to move or to turn, in
+// Mouse, touch, wheel and keys that lead the blade. Each reports to the hand how far to move or to turn, in
 // the axes of the view: to the right, up, and away from the eye.
 "use strict";
 

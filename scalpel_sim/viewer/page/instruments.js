@@ -37,7 +37,7 @@ class Instruments {
         for (const id of ["instrument", "jaws"]) element(id).disabled = !isEnabled;
     }
 
-    // Let go first: nothing jumps.
+    // Release first: nothing jumps.
     choose(number) {
         this.hand.letGoOfAll();
         this.hand.run.say({ type: "choose", instrument: number });

@@ -1,10 +1,10 @@
-// A page that follows a run. It tells the server when it has drawn a packet, and then gets the next.
+// A page that follows a run. It reports to the server when it has drawn a packet, and then gets the next.
 "use strict";
 
 const RETRY_AFTER = 2000; // time between attempts to reach the next run [ms]
 const LONGEST_DRAWING = 500; // [ms]: a tab that is hidden draws nothing
 
-// Call back once what was changed is on the screen: asked for another picture before, a page that draws
+// Call back once what was changed is on the screen: if another picture is requested before, a page that draws
 // slowly would decode many that it never shows.
 function afterDrawing(callback) {
     let isDone = false;

@@ -3,7 +3,7 @@
 
 const SHOWN_BY_KEY = { f: "faces", g: "grid", c: "cut" };
 
-let onQuantity = () => {}; // a live page tells the run, which computes what is looked at
+let onQuantity = () => {}; // a live page reports it to the run, which computes what is looked at
 
 function setShown(shown) {
     element("shown").value = shown;
@@ -51,7 +51,7 @@ function gradient() {
 sceneView.onScale = showScale;
 element("scale-bar").style.background = `linear-gradient(to right, ${gradient().join(", ")})`;
 
-// A list that was opened by a pointer gives the keys back once something is chosen. By keys one may go on.
+// A list that was opened by a pointer gives the keys back once something is chosen. By keys one may continue.
 function chooseIn(list, choose) {
     let isByPointer = false;
     list.addEventListener("pointerdown", () => { isByPointer = true; });

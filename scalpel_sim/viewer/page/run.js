@@ -1,8 +1,8 @@
-// The run of the page: it stands still, goes slowly and goes back as the person asks. The first tab
+// The run of the page: it stands still, goes slowly and goes back as the person requests. The first tab
 // controls it; another takes over.
 "use strict";
 
-const SLOWER = 0.95; // factor of real time, of what was asked for, below which the page says so
+const SLOWER = 0.95; // factor of real time, of what was requested, below which the page says so
 
 const NO_STATE = {
     paused: false, rate: 1, real_time: 1, can_go_back: false, strokes: 0, ended: false, notice: "",
@@ -103,7 +103,7 @@ class Run {
         const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes, ended, notice } =
             this.state || NO_STATE;
         for (const id of ["pause", "step", "rate", "end"]) element(id).disabled = !this.leads || ended;
-        element("pause").textContent = paused ? "go on" : "pause";
+        element("pause").textContent = paused ? "continue" : "pause";
         element("rate").value = String(rate);
         element("undo").disabled = !this.leads || ended || strokes === 0;
         element("reset").disabled = !this.leads || ended || !canGoBack;

@@ -302,7 +302,7 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     _, err = program.communicate(timeout=60)
     assert program.returncode == 1
     assert re.match(
-        f"error: interrupted by {number.name} after .* holds what .*; --resume .*/run goes on",
+        f"error: interrupted by {number.name} after .* holds what .*; --resume .*/run continues",
         err.splitlines()[-1],
     )
     summary = json.loads((folder / "summary.json").read_text())

@@ -33,7 +33,7 @@ def test_a_run_pauses_goes_on_by_steps_and_in_slow_motion(scripted):
     tab = scripted
     tab.click("#pause")
     tab.wait_for_function("run.isPaused")
-    assert tab.inner_text("#pause") == "go on" and tab.inner_text("#pace") == "paused"
+    assert tab.inner_text("#pause") == "continue" and tab.inner_text("#pace") == "paused"
     before = tab.evaluate(TIME)
     tab.wait_for_timeout(A_WHILE)
     assert tab.evaluate(TIME) == before

@@ -156,7 +156,7 @@ def test_a_checkpoint_of_an_earlier_version_is_left_out_by_name(folder, whole, r
     resume(folder)
     expect_same(folder, whole)
     assert caplog.text.count("an earlier version of the program wrote it") == 2
-    assert "no note of what the run was asked for is whole" in caplog.text
+    assert "no note of what was requested of the run is whole" in caplog.text
     assert "the run begins again at its start" in caplog.text
 
 

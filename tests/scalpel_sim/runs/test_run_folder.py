@@ -189,7 +189,7 @@ def test_the_summary_and_the_table_tell_the_areas_asked_for_finished_and_paid(
     assert summary.asked_area_m2 == 2.5e-4 and summary.finished_area_m2 == finished
     assert summary.cut_area_paid_m2 == paid
     text = printed(summary if asked else summary._replace(asked_area_m2=None))
-    share = f"{1e6 * area:.0f} mm², {area / 2.5e-4:.0%} of what is asked"
+    share = f"{1e6 * area:.0f} mm², {area / 2.5e-4:.0%} of what is planned"
     assert (share in text) == asked
     assert bool(re.search("bridges finished .*12.5 mm² of the cut", text)) == (finished > 0.0)
     paid_for = "area paid for.* 200 mm², 80% of the cut: more than 5% off"

@@ -1,7 +1,7 @@
 """Which nodes and faces may touch a geom in a time step.
 
-Contacts go on from the list before with their forces and anchors: both lists have the same order,
-geom by geom, nodes before faces, each by its number.
+Contacts continue from the list before with their forces and anchors: both lists have the same
+order, geom by geom, nodes before faces, each by its number.
 """
 
 import math

@@ -28,7 +28,7 @@ from tissue.core.vec3 import Vec3, axpy, dot, scale, store, sub, vec3
 from tissue.mesh.body import Body
 
 _HANDED_ON = -1.0
-"""Value of `PenaltyForces.push` where a contact of the next list goes on with the force."""
+"""Value of `PenaltyForces.push` where a contact of the next list continues with the force."""
 
 SAME_DIRECTION = 0.7
 """Cosine between normals above which contacts are one: 45 degrees. Larger: a node on a curved lip
@@ -285,7 +285,7 @@ def _across(forces: PenaltyForces, body: Body, c: int) -> Vec3:
 
 @kernel
 def copy_contact(forces: PenaltyForces, c: int, to: int) -> None:
-    """Copy a contact to a row of the next list, where it goes on."""
+    """Copy a contact to a row of the next list, where it continues."""
     for q in range(4):
         forces.node[to, q] = forces.node[c, q]
         forces.weight[to, q] = forces.weight[c, q]

@@ -1,4 +1,4 @@
-"""Stiffness of the contacts by mass splitting, and offsets by which their forces go on.
+"""Stiffness of the contacts by mass splitting, and offsets by which their forces continue.
 
 A node of mass m_i whose share in all contacts is S_i = sum_c |w_ci| may bear the stiffness
 m_i W_i^2. With
@@ -69,7 +69,7 @@ Larger: more work on the springs behind; 0: what overlaps does so for good."""
 
 _MOST_RECOVERY = 0.5
 """Distance by which the contacts of a node come out in all between incisions, per node size: the
-deepest overlap that is tested. More: where contacts of slivers contradict each other they go on
+deepest overlap that is tested. More: where contacts of slivers contradict each other they continue
 pushing, and the slivers snap to and fro without end; less: deep overlaps stay."""
 
 _RECOVERY_FROM_SLACK = 4.0
@@ -138,7 +138,7 @@ def split_masses(
     frequency_squared: FloatArray,
     share: FloatArray,
 ) -> None:
-    """Write the stiffness of every contact; what has a force goes on by its offset (`_keep_force`).
+    """Write the stiffness of each contact; one with force continues by its offset (`_keep_force`).
 
     Args:
         forces: Stiffness, damping, offset, greatest depth, push, anchors and masses are written.

@@ -26,7 +26,7 @@ class SearchState(Arrays):
     n_listings: IntCell
     """Number of times that contacts were listed."""
     stage: IntCell
-    """Stage at which a search begins or, where it stopped for want of room, goes on: a value of
+    """Stage at which a search begins or, where it stopped for want of room, continues: a value of
     `search`."""
     is_pairing: IntCell
     """1 if pairs are updated in this search, else 0."""

@@ -42,12 +42,12 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
     """List the blocks with a tetrahedron that may be above `allowed` [1/s2]; return how many.
 
     None is where the bound at rest times the growth of the faces is not, and that of the shear
-    part times the stiffness: no division, no look at the nodes. Stiffness is written for all, since
+    part times the stiffness: no division, no test of the nodes. Stiffness is written for all, since
     a node depends on all around it.
     """
     law, n = solid.law, 0
     if math.isinf(allowed):
-        allowed = 0.0  # any bound is asked for
+        allowed = 0.0  # any bound is wanted
     for block in range(n_blocks(solid, n_tetrahedra)):
         x, y, z = _gradient(solid, block, is_known)
         place = width_of(solid.shape) * (1 + block)

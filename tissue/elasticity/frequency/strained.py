@@ -82,7 +82,7 @@ def strained_frequency(
         body: Rest positions and masses.
         points: Where the nodes are [m].
         visits: For searches.
-        limit: It need not be nearer to the truth than the number of steps asks for. The bound is
+        limit: It need not be nearer to the truth than the number of steps requires. The bound is
             not below what they allow where the tetrahedra are.
         is_known: Whether `displacement_gradients` was run there, and gradients are kept.
     """
@@ -133,7 +133,7 @@ def _noted(solid: Solid, limit: StepLimit, t: int, found: float, allowed: float)
 
     Args:
         solid: Written.
-        limit: The number of steps that is asked for.
+        limit: The number of steps that is required.
         t: The tetrahedron.
         found: Bound on its w^2 [1/s2].
         allowed: What the number of steps so far allows [1/s2].
