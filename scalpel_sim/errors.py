@@ -13,11 +13,11 @@ EXIT_WARNED = 4
 
 
 class UsageError(ValueError):
-    """What was requested is impossible: an unknown name, a file that is no mesh. Exit code 2."""
+    """The request is impossible: an unknown name, a file that is no mesh. Exit code 2."""
 
 
 class RunError(RuntimeError):
-    """What was requested is possible, and failed: a port in use, a full disk. Exit code 1."""
+    """The request is possible, and failed: a port in use, a full disk. Exit code 1."""
 
 
 class CheckError(RunError):

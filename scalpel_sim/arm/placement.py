@@ -52,7 +52,7 @@ class PlacementError(UsageError):
 
 
 class Neighbours(NamedTuple):
-    """What an arm with a grasper stands next to, tissue frame."""
+    """Bodies that an arm with a grasper stands next to, tissue frame."""
 
     boxes: FloatArray
     """Lowest and highest corners of what lies there [m], shape (2, 3) or (n, 2, 3): see `place`."""
@@ -61,7 +61,7 @@ class Neighbours(NamedTuple):
     table: float | None = None
     """Height of the table on which it stands [m]; None: of its own."""
     others: Sequence[Spheres] = ()
-    """What covers the arms that stand there, at these instants."""
+    """Spheres that cover the arms that stand there, at these instants."""
 
 
 class Placement(NamedTuple):

@@ -62,7 +62,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
 
 
 class RunOptions(NamedTuple):
-    """What the command line requests, group by group."""
+    """Requests of the command line, group by group."""
 
     tissue: TissueOptions
     arm: ArmOptions

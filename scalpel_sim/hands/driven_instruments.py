@@ -27,7 +27,7 @@ class LiveInstrument(abc.ABC):
     Its pose leads the hand to the same bits as a stroke with that pose in a row does.
 
     Args:
-        name: What the page calls it.
+        name: Name on the page.
         hand: Holds the instrument already, at the start.
         start: Its edge at first, tissue frame.
         frame: Where the tissue lies in the world.
@@ -45,7 +45,7 @@ class LiveInstrument(abc.ABC):
         dt: float,
     ) -> None:
         self.name = name
-        """What the page calls it."""
+        """Name on the page."""
         self._frame, self._dt = frame, dt
         path = Stroke([0.0, 1.0], [start, start])
         self._row = path.path[0]

@@ -204,7 +204,7 @@ class RunControls:
         self.next: Begin | None = None
         """The run that the page has requested after this one."""
         self.notice = ""
-        """What the page is to report to the person."""
+        """Message of the page to the person."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
         self.on_wait: Callable[[], None] = lambda: None

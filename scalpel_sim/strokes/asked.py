@@ -1,4 +1,4 @@
-"""What a stroke is planned to cut: the area, in the body at rest, and how many pieces it leaves.
+"""Plan of what a stroke cuts: the area, in the body at rest, and how many pieces it leaves.
 
 Areas are counted as areas of cuts are; pieces are joined next to the sheet that the edge sweeps.
 """

@@ -79,13 +79,13 @@ class Relaxation(Arrays, two_precisions=True):
     has_faces: IntCell
     """1 if the blade has side faces, 0 for a line that cuts."""
     step: StepContext
-    """What the integrator works on."""
+    """Everything that the integrator reads and writes."""
     choice: StepChoice
     """Into how many steps the increment is divided."""
     blade: BladeContext
-    """What searches of the blade work on."""
+    """Everything that searches of the blade read and write."""
     contacts: SearchState
-    """What the search for contacts works on."""
+    """Data of the search for contacts."""
     limits: Limits
     """Limits of the stiffness of contacts."""
     nodes: IntArray

@@ -40,7 +40,7 @@ class FrameContext(Arrays, two_precisions=True):
     travel: FloatCell
     """Distance that the edge moves in the time step [m]."""
     relaxation: Relaxation
-    """What the relaxation of an increment works on."""
+    """Everything that the relaxation of an increment reads and writes."""
     node_size: float
     """Mean node size [m]."""
 
