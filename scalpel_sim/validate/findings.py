@@ -65,7 +65,7 @@ class Check(NamedTuple):
     low: float
     high: float
     basis: Basis
-    """What the bounds come from."""
+    """Source of the bounds."""
     unit: str = ""
     known: KnownDeviation | None = None
 
@@ -83,9 +83,9 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A measured line of a section: a quantity, and the bounds of its value."""
 
     name: str
-    """What is measured; words in braces are filled in."""
+    """Name of the measured quantity; words in braces are filled in."""
     basis: Basis
-    """What the bounds come from."""
+    """Source of the bounds."""
     near: float | None = None
     """Largest deviation of the value from 1; None where `low` and `high` are the bounds."""
     low: float = -math.inf
@@ -118,11 +118,11 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is said of a scene, and the lines that are measured in it."""
+    """Texts of a scene, and the lines that are measured in it."""
 
     title: str
     about: str
-    """What is done, what is compared with what, and what it means for a user."""
+    """Procedure, comparison, and meaning for a user."""
     lines: dict[str, Line]
     references: list[Reference] = []
 
@@ -173,7 +173,7 @@ class ValidationScene(NamedTuple):
     """One word, for `--only`."""
     title: str
     about: str
-    """What is done, what is compared with what, and what it means for a user."""
+    """Procedure, comparison, and meaning for a user."""
     measure: Callable[[bool], Findings]
     """Runs the experiment; the argument says whether to run the short version."""
     references: Sequence[Reference] = ()

@@ -48,7 +48,7 @@ class PageControls(NamedTuple):
     is_led: bool = False
     """Whether it leads the blade."""
     choices: Choices | None = None
-    """What it may request in the next run; None: there is none."""
+    """Choices for the next run; None: there is none."""
 
 
 class ViewerSettings(NamedTuple):
@@ -71,7 +71,7 @@ class ViewerSettings(NamedTuple):
     is_led: bool = False
     """Whether it leads the blade, too."""
     choices: Choices | None = None
-    """What it may request in the next run; None: there is none."""
+    """Choices for the next run; None: there is none."""
 
 
 class SceneState(NamedTuple):

@@ -30,6 +30,7 @@ from tissue.contact.search_stages import (
     NEEDS_SKIN,
     NO_ROOM_FOR_PAIRS,
     SEARCHES_TO_NORMALS,
+    added_frequency,
     begin_contacts,
     search_contacts,
     take_changed_faces,
@@ -145,7 +146,7 @@ class SelfContact:
     @property
     def added_frequency_squared(self) -> float:
         """Largest part of contact in w^2 of the body [1/s2]."""
-        return self.limits.added if self.search.n_found else 0.0
+        return added_frequency(self.search, self.limits)
 
     def begin(self) -> None:
         """Clear the totals, and search before the next substep."""
@@ -186,9 +187,9 @@ class SelfContact:
             outcome = wake_contacts(self.search, body)
             if outcome == DONE:
                 return
-            self.settle(outcome, body, frequency_squared, highest, room, seconds)
+            self.follow_up(outcome, body, frequency_squared, highest, room, seconds)
 
-    def settle(
+    def follow_up(
         self,
         outcome: int,
         body: Body,
@@ -197,7 +198,7 @@ class SelfContact:
         room: float,
         seconds: float,
     ) -> None:
-        """Do what a test whether anything could touch asks for.
+        """Search the contacts, or take the skin, that a test of what could touch found due.
 
         Args:
             outcome: Returned by `wake_contacts`; not DONE.

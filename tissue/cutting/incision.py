@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, NoReturn
+from typing import Final, NamedTuple, NoReturn
 
+from tissue.core.jit import kernel
 from tissue.cut_settings import SCHEMES, CutSettings
 from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.stellar_scheme import StellarScheme
@@ -21,12 +22,31 @@ MOST_EDGE_INCREMENTS = 10_000
 """Increments of a step at most: half a minute of wall time in an organ, for a path of some metres.
 More is taken for a mistake, which would keep a process for hours."""
 
+TOO_MANY: Final = 0
+"""Returned where there would be more increments than `MOST_EDGE_INCREMENTS`."""
+
 RESTING_SPEED = 0.2
 """Mean node sizes per second below which the edge counts as at rest."""
 
 RESTING_TIME = 0.02
 """Time at rest before the cut opens up to the edge [s]. A trembling hand stands still for an
 instant at each turn; to lay a crack front there each time would shred the mesh."""
+
+
+@kernel
+def count_increments(travel: float, node_size: float) -> int:
+    """Return in how many increments the edge moves, little in each; or TOO_MANY.
+
+    It is 1 for a path that is not finite: a blade on it is refused anyway.
+
+    Args:
+        travel: Distance that the edge moves [m].
+        node_size: Mean node size of the body [m].
+    """
+    n = travel / (INCREMENT * node_size)
+    if not math.isfinite(n):
+        return 1
+    return TOO_MANY if n > MOST_EDGE_INCREMENTS else max(1, math.ceil(n))
 
 
 class NoRoomError(Exception):
@@ -96,17 +116,15 @@ class Incision:
         Raises:
             ValueError: there are more than `MOST_EDGE_INCREMENTS`.
         """
-        n = travel / (INCREMENT * self._node_size)
-        if not math.isfinite(n):
-            return 1
-        if n > MOST_EDGE_INCREMENTS:
+        n = count_increments(travel, self._node_size)
+        if n == TOO_MANY:
             most = MOST_EDGE_INCREMENTS * INCREMENT * self._node_size
             raise ValueError(
                 f"the edge of the blade moves {travel:.3g} m in one step; that may be {most:.3g} m "
                 "in this mesh. Take shorter steps, or begin with `None` where the blade is put "
                 "elsewhere"
             )
-        return max(1, math.ceil(n))
+        return n
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Do nothing: the scheme made the change."""

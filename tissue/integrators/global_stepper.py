@@ -99,7 +99,7 @@ class GlobalStepper:
             elastic = system.elasticity.arrays
             bounds = elastic.frequency_squared, elastic.highest, arrays.choice.room
             contact = system.contact
-            contact.settle(outcome - LACKS_CONTACTS, system.body, *bounds, span)
+            contact.follow_up(outcome - LACKS_CONTACTS, system.body, *bounds, span)
             if contact.search is arrays.contacts and contact.forces is arrays.step.contacts:
                 return arrays
         else:

@@ -4,7 +4,6 @@ Each call from Python costs 1 to 4 us. Where the begin needs something, a call r
 continues behind it.
 """
 
-import math
 from typing import Final
 
 from tissue.blade.edge import Edge, is_other_length
@@ -13,7 +12,7 @@ from tissue.contact.search_stages import added_frequency, begin_contacts
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import norm, sub
-from tissue.cutting.incision import INCREMENT, MOST_EDGE_INCREMENTS
+from tissue.cutting.incision import TOO_MANY, count_increments
 from tissue.integrators.driver import Relaxation
 from tissue.integrators.stability import surely_takes_few_steps
 from tissue.mesh.node_motion import is_motion_finite
@@ -93,17 +92,13 @@ def begin_frame(
 def _divide_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
     """Write into how many increments the travel of the edge divides the step.
 
-    It is 1 for a path that is not finite: a blade on it is refused.
-
     Returns:
-        Whether they are at most `MOST_EDGE_INCREMENTS`.
+        Whether they are few enough: see `count_increments`.
     """
     frame.n_increments, frame.travel = 1, 0.0
     if has_blade:
         tip = norm(sub(edge.tip_t1, edge.tip_t0))
         frame.travel = max(tip, norm(sub(edge.heel_t1, edge.heel_t0)))
-    n = frame.travel / (INCREMENT * frame.node_size)
-    if not math.isfinite(n):
-        return True
-    frame.n_increments = max(1, min(math.ceil(n), MOST_EDGE_INCREMENTS))
-    return bool(n <= MOST_EDGE_INCREMENTS)
+    n = count_increments(frame.travel, frame.node_size)
+    frame.n_increments = max(1, n)
+    return bool(n != TOO_MANY)

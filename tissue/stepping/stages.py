@@ -166,7 +166,7 @@ class StepStages:
             outcome = self._begin_frame.call(frame, edge, has_blade, *numbers, outcome)
             if outcome == BEGUN:
                 break
-            self._settle(outcome, sweep, edge, dt)
+            self._follow_up(outcome, sweep, edge, dt)
         n, travel = frame.n_increments, frame.travel
         if model.geoms.geoms:
             n = max(n, model.geoms.begin_step(model.body, dt))
@@ -175,7 +175,7 @@ class StepStages:
             self.handles.begin_step(dt)
         return n * self.global_stepper.refinement, travel
 
-    def _settle(self, outcome: int, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
+    def _follow_up(self, outcome: int, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
         """Run what the begin of a step needs, or refuse the step; see `begin_frame`."""
         model = self.model
         if outcome == NOT_FINITE_BEFORE:

@@ -113,7 +113,7 @@ def bracket(gap: float) -> TetrahedralMesh:
 
 
 def fallen(gap: float, solver: SolverSettings) -> tuple[Tissue, float]:
-    """Let the upper arm fall on the lower one; return the body and how low it came [m]."""
+    """Drop the upper arm on the lower one; return the body and how low it came [m]."""
     mesh = bracket(gap)
     held, arm = mesh.positions[:, 2] < 1e-6, mesh.positions[:, 2] > 0.0079 + gap
     tissue = Tissue(mesh, GEL, fixed=held, solver=solver)
