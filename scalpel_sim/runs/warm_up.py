@@ -47,7 +47,7 @@ N_STEPS = 40
 _DT = 1e-3
 _SECONDS_PER_CHECK = 0.1
 """Time between two checks of the progress of the processes [s]."""
-USUAL_NUMBER = 838
+USUAL_NUMBER = 1000
 """How many kernels a set has, about: the end of the progress bar, unless there are more."""
 
 Progress = Callable[[int, int], None]

@@ -17,6 +17,7 @@ import llvmlite.binding as llvm
 import numba as nb
 import platformdirs
 from numba.core import caching, compiler
+from numba.core.serialize import dumps
 
 # A kernel contains kernels from other files, so the folder is named after all of them: editing one
 # can never revive an old binary.
@@ -174,6 +175,24 @@ class KernelCache(caching.Cache):
             numba_s._cache_path, self._impl.filename_base, numba_s._source_stamp
         )
 
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return a result that was written, or None.
+
+        Numba searches all its registries for new code before each; once is enough.
+        """
+        _refresh_once(context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(signature, context)
+
+    def _index_key(self, signature: Any, codegen: Any) -> Any:
+        """Return what tells results of the function apart, beside its source and the processor.
+
+        They are in the names of the file and of the folder.
+        """
+        cells = self._py_func.__closure__ or ()
+        values = dumps(tuple(cell.cell_contents for cell in cells)) if cells else b""
+        return signature, hashlib.sha256(values).hexdigest()
+
     def save_overload(self, signature: Any, result: Any) -> None:
         """Write a result; without a place to write, the next process compiles it again."""
         try:
@@ -185,3 +204,8 @@ class KernelCache(caching.Cache):
 @functools.cache
 def _warn_once(message: str) -> None:
     _log.warning(message)
+
+
+@functools.cache
+def _refresh_once(context: Any) -> None:
+    context.refresh()

@@ -9,8 +9,7 @@ the time, to the same bits.
 """
 
 import importlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, Self, cast
 
@@ -25,7 +24,7 @@ from numba.core.typed_passes import (
     NopythonTypeInference,
     PreLowerStripPhis,
 )
-from numba.core.types import Function, unliteral
+from numba.core.types import unliteral
 from numba.core.untyped_passes import (
     DeadBranchPrune,
     FixupArgs,
@@ -37,13 +36,7 @@ from numba.core.untyped_passes import (
 )
 
 from tissue.core.kernel_cache import KernelCache
-
-_function_type: Any = Function
-
-_get_call_type = _function_type.get_call_type
-
-_SIGNATURES: dict[tuple[Any, tuple[Any, ...]], Any] = {}
-"""Signatures that were found, by function and types of the arguments."""
+from tissue.core.shortcuts import shortcuts
 
 
 class _Origin(NamedTuple):
@@ -287,31 +280,3 @@ def in_parts(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
     program.get_call_template = call_template  # other kernels call the part
     program.get_overload = part.get_overload
     return program
-
-
-@contextmanager
-def shortcuts() -> Iterator[None]:
-    """Compile without what is done twice or for nobody. Blocks may be nested; one thread compiles.
-
-    For each `a + b` Numba tries some eighty implementations one after the other, once to find the
-    type and once to find the code. Here the signature is remembered. Numba reports to each function
-    that is being compiled each call of LLVM, for a sum of times that nobody reads.
-    """
-    lock = llvm.ffi.lib._lock
-    listeners, lock._cblist = lock._cblist, []
-    before, _function_type.get_call_type = _function_type.get_call_type, _call_type
-    try:
-        yield
-    finally:
-        lock._cblist = listeners
-        _function_type.get_call_type = before
-
-
-def _call_type(function: Any, context: Any, args: Any, keywords: Any) -> Any:
-    """Return the signature of a call with arguments of these types."""
-    if keywords:
-        return _get_call_type(function, context, args, keywords)
-    call = function, tuple(args)
-    if call not in _SIGNATURES:
-        _SIGNATURES[call] = _get_call_type(function, context, args, keywords)
-    return _SIGNATURES[call]

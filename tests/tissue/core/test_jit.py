@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tissue
-from tissue.core import kernel_parts
+from tissue.core import kernel_parts, shortcuts
 from tissue.core.jit import SameTypes, inlined, is_compiling, kernel
 from tissue.core.kernel_cache import cache_directory
 
@@ -170,14 +170,31 @@ def test_a_kernel_has_the_same_flags_whoever_calls_it_first():
 
 @pytest.mark.skipif(not is_compiling(), reason="nothing is compiled")
 def test_compiling_a_kernel_leaves_numba_as_it_was():
-    before = nb.types.Function.get_call_type, list(llvm.ffi.lib._lock._cblist)
+    def numba_s():
+        functions = [getattr(owner, name) for owner, name, _ in shortcuts._REPLACEMENTS]
+        return functions, list(llvm.ffi.lib._lock._cblist)
+
+    before = numba_s()
 
     @kernel
     def added(a, b):
         return a + b
 
     assert added(1, 2) == 3
-    assert before == (nb.types.Function.get_call_type, list(llvm.ffi.lib._lock._cblist))
+    assert before == numba_s()
+
+
+@pytest.mark.skipif(not is_compiling(), reason="nothing is compiled")
+def test_a_kernel_that_cannot_be_compiled_leaves_numba_as_it_was():
+    before = [getattr(owner, name) for owner, name, _ in shortcuts._REPLACEMENTS]
+
+    @kernel
+    def of_no_type(a):
+        return a.attribute_that_no_array_has
+
+    with pytest.raises(nb.TypingError, match="attribute_that_no_array_has"):
+        of_no_type(np.zeros(3))
+    assert before == [getattr(owner, name) for owner, name, _ in shortcuts._REPLACEMENTS]
 
 
 def test_a_kernel_for_a_caller_of_the_same_types_does_the_same_in_each_call():
