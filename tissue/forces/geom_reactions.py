@@ -11,7 +11,7 @@ Source: Baraff (1994), Fast contact force computation for nonpenetrating rigid b
 in terms of accelerations.
 """
 
-from tissue.contact.geoms.geom_arrays import GeomContacts
+from tissue.contact.geoms.geom_arrays import GeomContacts, n_corners
 from tissue.contact.geoms.kinematic_contact import (
     SWEEPS,
     add_to_nodes,
@@ -63,12 +63,12 @@ def _note_accelerations(
     contacts, body, accelerations = context.geoms, context.body, context.geoms.acceleration
     rows = range(contacts.first, contacts.first + contacts.n_contacts)
     for c in rows:
-        for q in range(3):
+        for q in range(n_corners(contacts, c)):
             contacts.is_noted[contacts.node[c, q]] = 0
     for c in rows:
         if contacts.touches[c] == 0:
             continue
-        for q in range(3):
+        for q in range(n_corners(contacts, c)):
             node = contacts.node[c, q]
             if contacts.is_noted[node] == 0:
                 contacts.is_noted[node] = 1
@@ -119,7 +119,7 @@ def _act(
 ) -> None:
     """Add a force of contact `c` on its nodes, and count what it does in some time [s]."""
     contacts, external = context.geoms, context.stages.external
-    for q in range(3):
+    for q in range(n_corners(contacts, c)):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
         if weight != 0.0:
             store(external, node, axpy(weight, force, vec3(external, node)))

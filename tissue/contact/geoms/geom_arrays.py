@@ -147,6 +147,12 @@ class GeomContacts(Arrays):
     """Angular impulse on it about the origin [N m s], shape (2 * capacity, 3)."""
 
 
+@inlined
+def n_corners(contacts: GeomContacts, c: int) -> int:
+    """Return the number of different nodes of contact `c`: one, or the corners of a face."""
+    return 1 if contacts.face[c] == NODE_CONTACT else 3
+
+
 class GeomSearch(Arrays):
     """Scratch of the search, and how long its list will do."""
 

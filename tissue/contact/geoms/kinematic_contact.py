@@ -19,6 +19,7 @@ from tissue.contact.geoms.geom_arrays import (
     NODE_CONTACT,
     GeomContacts,
     geom_motion_at,
+    n_corners,
     place_geoms,
     to_geom,
     turned_from_geom,
@@ -110,17 +111,17 @@ def _note_resistances(contacts: GeomContacts, body: Body, seconds: float) -> Non
         contacts.resistance,
     )
     for c in rows:
-        for q in range(3):
+        for q in range(n_corners(contacts, c)):
             node = contacts.node[c, q]
             change = sub(vec3(body.velocities, node), vec3(contacts.velocity, node))
             store(resistance, node, scale(body.masses[node] / seconds, change))
     for c in rows:
-        for q in range(3):
+        for q in range(n_corners(contacts, c)):
             node, weight = contacts.node[c, q], contacts.weight[c, q]
             held = axpy(-weight, vec3(contacts.force, c), vec3(resistance, node))
             store(resistance, node, held)
     for c in rows:
-        for q in range(3):
+        for q in range(n_corners(contacts, c)):
             _correct_work(contacts, contacts.node[c, q])
 
 
@@ -210,7 +211,7 @@ def _move(contacts: GeomContacts, body: Body, c: int, by: Vec3) -> None:
 
     The work is counted with the forces before. `_correct_work` adds that of the forces after.
     """
-    for q in range(3):
+    for q in range(n_corners(contacts, c)):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
         if weight != 0.0 and not body.fixed[node]:
             shift = scale(weight / body.masses[node], by)
@@ -226,7 +227,7 @@ def weighted(contacts: GeomContacts, c: int, values: FloatArray) -> Vec3:
     """Return nodal values at the point of contact `c`."""
     node, weight = contacts.node, contacts.weight
     total = scale(weight[c, 0], vec3(values, node[c, 0]))
-    for q in range(1, 3):
+    for q in range(1, n_corners(contacts, c)):
         if weight[c, q] != 0.0:
             total = axpy(weight[c, q], vec3(values, node[c, q]), total)
     return total
@@ -236,7 +237,7 @@ def weighted(contacts: GeomContacts, c: int, values: FloatArray) -> Vec3:
 def mobility_at(contacts: GeomContacts, body: Body, c: int) -> float:
     """Return by how much an impulse changes the velocity of the point of contact `c` [1/kg]."""
     total = 0.0
-    for q in range(3):
+    for q in range(n_corners(contacts, c)):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
         if not body.fixed[node]:
             total += weight * weight / body.masses[node]
@@ -257,7 +258,7 @@ def add_to_nodes(
             accelerations.
         values: Written, shape (n_nodes, 3).
     """
-    for q in range(3):
+    for q in range(n_corners(contacts, c)):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
         if weight != 0.0 and not body.fixed[node]:
             store(values, node, axpy(weight / body.masses[node], change, vec3(values, node)))
@@ -266,7 +267,7 @@ def add_to_nodes(
 @kernel
 def note_velocities(contacts: GeomContacts, body: Body, c: int) -> None:
     """Record the velocities of the nodes of contact `c`."""
-    for q in range(3):
+    for q in range(n_corners(contacts, c)):
         node = contacts.node[c, q]
         store(contacts.velocity, node, vec3(body.velocities, node))
 
@@ -275,7 +276,7 @@ def note_velocities(contacts: GeomContacts, body: Body, c: int) -> None:
 def clear_geom_forces(contacts: GeomContacts, external: FloatArray) -> None:
     """Set the forces on the nodes of all contacts to zero."""
     for c in range(contacts.first, contacts.first + contacts.n_contacts):
-        for q in range(3):
+        for q in range(n_corners(contacts, c)):
             store(external, contacts.node[c, q], Vec3(0.0, 0.0, 0.0))
 
 
