@@ -123,8 +123,8 @@ class Solid(Arrays, two_precisions=True):
     fast_blocks: IntArray = sized("blocks")
     """Scratch of `frequency.quick`: blocks with a tetrahedron that may be too fast."""
     stiffening: FloatArray = sized("behind_a_block", is_for_vectors=True)
-    """Scratch of `frequency.quick`, under laws that stiffen: shear modulus of tetrahedron t over
-    that at rest, behind a first block (`tissue.laws.kernels`)."""
+    """Scratch, behind a first block: under laws that stiffen g of tetrahedron t, its shear modulus
+    over that at rest (`tissue.laws.kernels`), else s [Pa] (`neo_hookean`)."""
     stiffening_slope: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch of `frequency.quick`, under laws that stiffen: how fast that rises."""
     stiffness: FloatArray = sized("behind_a_block", is_for_vectors=True)

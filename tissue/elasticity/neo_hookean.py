@@ -40,8 +40,7 @@ from tissue.core.simd_rows import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
-from tissue.laws.energy_density import EnergyDensity
-from tissue.laws.kernels import stiffening_factor, stiffens, stretch_invariant
+from tissue.laws.kernels import isotropic_factor, stiffening_factor, stiffens, stretch_invariant
 from tissue.mesh.body import Body
 
 NO_VOLUME = 1e-30
@@ -100,12 +99,7 @@ def has_averaged_volumes(solid: Solid) -> bool:
 
 @kernel
 def displacements(
-    solid: Solid,
-    body: Body,
-    positions: FloatArray,
-    nodes: IntArray,
-    begin: int,
-    end: int,
+    solid: Solid, body: Body, positions: FloatArray, nodes: IntArray, begin: int, end: int
 ) -> None:
     """Write the displacements of `nodes[begin:end]` from rest to `positions` [m].
 
@@ -124,18 +118,38 @@ def displacements(
 
 @kernel
 def displacement_gradients(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
-    """Write H and V (J - 1) of the tetrahedra of `blocks[begin:end]`, after `displacements`."""
-    width = width_of(solid.shape)
-    for i in range(begin, end):
-        block = blocks[i]
-        x, y, z = gradient_of_displacement(solid, block)
-        if keeps_gradients(solid):
-            at = 9 * width * block
-            _store_vector(solid, at, x)
-            _store_vector(solid, at + 3 * width, y)
-            _store_vector(solid, at + 6 * width, z)
-        cofactors = cofactors_of(x, y, z)
-        store_block(solid.dilated, width * (1 + block), _dilated(solid, block, x, y, z, cofactors))
+    """Write H, V (J - 1) and `Solid.stiffening` of `blocks[begin:end]`, after `displacements`."""
+    # Two loops, so that the code of each is without a branch.
+    if stiffens(solid.law):
+        for i in range(begin, end):
+            _write_gradient(solid, blocks[i], True)
+    else:
+        for i in range(begin, end):
+            _write_gradient(solid, blocks[i], False)
+
+
+@inlined
+def _write_gradient(solid: Solid, block: int, has_stiffened: bool) -> None:
+    """Write what `displacement_gradients` does of a block; `has_stiffened` is a constant there.
+
+    In `corner_forces` a long chain of operations would wait for the factor of the shear: for a
+    division, or an exponential.
+    """
+    law, width = solid.law, width_of(solid.shape)
+    x, y, z = gradient_of_displacement(solid, block)
+    if keeps_gradients(solid):
+        at = 9 * width * block
+        _store_vector(solid, at, x)
+        _store_vector(solid, at + 3 * width, y)
+        _store_vector(solid, at + 6 * width, z)
+    cofactors = cofactors_of(x, y, z)
+    place = width * (1 + block)
+    store_block(solid.dilated, place, _dilated(solid, block, x, y, z, cofactors))
+    if has_stiffened:
+        factor = stiffening_factor(law, stretch_invariant(x, y, z, *cofactors))
+    else:
+        factor = isotropic_factor(law, x.x + y.y + z.z, x, y, z)
+    store_block(solid.stiffening, place, factor)
 
 
 @kernel
@@ -194,11 +208,12 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
         p = p - relaxed_pressure(solid, block)
     trace = x.x + y.y + z.z
     cx, cy, cz = cofactors_of(x, y, z)
+    factor = load_block(solid.stiffening, width * (1 + block))
     if stiffens(law):
-        rest = splat(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        rest = splat(law.mu, v) * factor
         s = splat(0.0, v)
     else:
-        s = isotropic_factor(law, trace, x, y, z)
+        s = factor
         rest = splat(0.75 * law.mu, v)
     # The factors of H, K and 1, times -V:
     minus_v = splat(-1.0, v) * v
@@ -247,21 +262,6 @@ def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return J - 1 of the tetrahedra of a block by themselves, after `displacement_gradients`."""
     dilated = load_block(solid.dilated, width_of(solid.shape) * (1 + block))
     return dilated / (v + splat(NO_VOLUME, v))
-
-
-@inlined
-def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
-    """Return s of the neo-Hookean law [Pa].
-
-    Args:
-        law: The law.
-        trace: tr H.
-        x: First row of H.
-        y: Second row.
-        z: Third row.
-    """
-    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-    return splat(0.25 * law.mu, trace) * grown / (grown + splat(4.0, trace))
 
 
 @inlined

@@ -33,13 +33,12 @@ from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid
 from tissue.elasticity.neo_hookean import (
     cofactors_of,
-    isotropic_factor,
     known_gradient,
     own_dilatation,
     pressure_of,
     shape_of,
 )
-from tissue.laws.kernels import stiffening_factor, stiffens, stretch_invariant
+from tissue.laws.kernels import stiffens
 
 SMALLEST_RATIO = 0.1
 """J below which S is that of a tetrahedron of this J, with less of it: S has the factor 1 / J, and
@@ -115,11 +114,12 @@ def _elastic_stress(
     v = shape_of(solid, block, VOLUME)
     cx, cy, cz = cofactors_of(x, y, z)
     trace = x.x + y.y + z.z
+    factor = load_block(solid.stiffening, width_of(solid.shape) * (1 + block))
     if stiffens(law):
-        c = splat(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        c = splat(law.mu, v) * factor
         s = splat(0.0, v)
     else:
-        c, s = splat(0.75 * law.mu, v), isotropic_factor(law, trace, x, y, z)
+        c, s = splat(0.75 * law.mu, v), factor
     # The columns of K = (tr H) 1 - H^T + cof H:
     a = Vec3(trace - x.x + cx.x, cy.x - x.y, cz.x - x.z)
     b = Vec3(cx.y - y.x, trace - y.y + cy.y, cz.y - y.z)

@@ -53,6 +53,21 @@ def stiffens(law: EnergyDensity) -> bool:
 
 
 @inlined
+def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
+    """Return s of the neo-Hookean law [Pa] (`tissue.elasticity.neo_hookean`).
+
+    Args:
+        law: The law.
+        trace: tr H.
+        x: First row of H.
+        y: Second row.
+        z: Third row.
+    """
+    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
+    return splat(0.25 * law.mu, trace) * grown / (grown + splat(4.0, trace))
+
+
+@inlined
 def stretch_invariant(x: Vec3, y: Vec3, z: Vec3, cx: Vec3, cy: Vec3, cz: Vec3) -> Lanes:
     """Return q.
 

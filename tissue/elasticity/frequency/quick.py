@@ -57,7 +57,7 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
         # Where the bound at rest is above the limit, any growth counts.
         least = where_larger(one, room, room, least)
         if stiffens(law):
-            stiffness = _write_stiffness(solid, block, x, y, z)
+            stiffness = _write_stiffness(solid, block, x, y, z, is_known)
             room = room - load_block(solid.shear_share, place) * stiffness
             least = where_larger(stiffness, least, room, least)
         room = larger(room, least)
@@ -71,7 +71,8 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
 def quick_bounds_of_one(elastic: Elastic, block: int, is_known: bool) -> None:
     """Write quick bounds on w^2 of a block before `list_fast_blocks`."""
     if stiffens(elastic.solid.law):
-        _write_stiffness(elastic.solid, block, *_gradient(elastic.solid, block, is_known))
+        x, y, z = _gradient(elastic.solid, block, is_known)
+        _write_stiffness(elastic.solid, block, x, y, z, is_known)
     quick_bounds(elastic, block, is_known)
 
 
@@ -182,13 +183,21 @@ def _gradients_of_shape(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3, Vec
 
 
 @inlined
-def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
+def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, is_known: bool) -> Lanes:
     """Write a bound on the stiffness of the shear part over that at rest, and what it is of.
 
     It is returned.
 
     A node that moves by u changes F by u times grad N. The second derivative of J by that is 0, and
     that of the energy is mu (g |dF|^2 + 2 g' ((F - cof F) : dF)^2).
+
+    Args:
+        solid: Written.
+        block: The block.
+        x: First row of H.
+        y: Second row.
+        z: Third row.
+        is_known: Whether `displacement_gradients` has found g.
     """
     trace = x.x + y.y + z.z
     cx, cy, cz = cross(y, z), cross(z, x), cross(x, y)
@@ -199,10 +208,11 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lan
     az = Vec3(z.x + x.z - cz.x, z.y + y.z - cz.y, two * z.z - trace - cz.z)
     squared = dot(ax, ax) + dot(ay, ay) + dot(az, az)
     q = stretch_invariant(x, y, z, cx, cy, cz)
-    g = stiffening_factor(solid.law, q)
-    slope = stiffening_slope(solid.law, q, g)
     place = width_of(solid.shape) * (1 + block)
-    store_block(solid.stiffening, place, g)
+    if not is_known:
+        store_block(solid.stiffening, place, stiffening_factor(solid.law, q))
+    g = load_block(solid.stiffening, place)
+    slope = stiffening_slope(solid.law, q, g)
     store_block(solid.stiffening_slope, place, slope)
     stiffness = g + (slope + slope) * squared
     store_block(solid.stiffness, place, stiffness)

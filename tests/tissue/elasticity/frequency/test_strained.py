@@ -129,6 +129,26 @@ def test_what_was_found_slow_enough_is_found_again_when_it_is_strained_further()
     assert found[2] > allowed
 
 
+ROUNDING = {False: 1e-14, True: 1e-6}
+"""Relative difference of two bounds by rounding alone, in double and in single precision [1]."""
+
+
+@pytest.mark.parametrize("law", ["averaged", "exponential", "yeoh"])
+@pytest.mark.parametrize("is_single", [False, True], ids=["double", "single"])
+def test_the_bound_is_the_same_where_forces_were_evaluated_before(law, is_single):
+    """Then gradients are known, and how far each tetrahedron has stiffened."""
+    found = []
+    for is_known in (False, True):
+        solid = solid_of(MESH, LAWS[law], is_single=is_single)
+        x = solid.placed(MESH.positions @ STRETCHES["rod"].T)
+        if is_known:
+            solid.forces(x[: len(MESH.positions)])
+        visits = no_visits(len(solid.body.rest), len(solid.body.tetrahedra))
+        elastic = elastic_of(solid)
+        found.append(strained_frequency(elastic, solid.body, x, visits, above(0.0), is_known))
+    assert found[1] == pytest.approx(found[0], rel=ROUNDING[is_single])
+
+
 @pytest.mark.parametrize("law", ["averaged", "exponential"])
 @pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
 def test_a_bound_holds_whatever_was_allowed_before(stretch, law):
