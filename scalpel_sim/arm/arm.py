@@ -2,7 +2,6 @@
 
 import logging
 import math
-import operator
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -16,7 +15,8 @@ from scalpel_sim.arm.grasper import HeldArm
 from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from scalpel_sim.arm.standing import Standing, StandingFixture, collide_as_one_arm
 from scalpel_sim.errors import unknown
-from tissue import FloatArray
+from tissue import FloatArray, IntArray
+from tissue.support import SameTypes, kernel
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -118,8 +118,14 @@ class DrivenArm:
         self._qpos, self._qvel = self.data.qpos, self.data.qvel
         self._n_warnings = self.data.warning.number
         self._dt: float = self.model.opt.timestep
-        self._angles: list[float] | None = None
-        """Angles at the last check; None: there was none since the arm was put elsewhere."""
+        self._angles = np.full(self.model.nq, math.nan)
+        """Angles at the last check; NaN: there was none since the arm was put elsewhere."""
+        # As bytes the angles are compared in a tenth of a microsecond.
+        self._bytes = self._qpos.data.cast("B"), self._angles.data.cast("B")
+        self._take_state = SameTypes(_take_state)
+        self._take_state.call(
+            self._qpos, self._qvel, self._angles.copy(), self._n_warnings, self._dt
+        )
 
     @property
     def time(self) -> float:
@@ -148,7 +154,7 @@ class DrivenArm:
                 f"{low[i]:.3f} to {high[i]:.3f}"
             )
         mujoco.mj_resetData(self.model, self.data)
-        self._angles = None
+        self._angles[:] = math.nan
         self.data.qpos[:] = np.concatenate([angles, *(other.qpos for other in self.others)])
         mujoco.mj_kinematics(self.model, self.data)
         self.hand.hold(self.blade.segment())
@@ -171,7 +177,7 @@ class DrivenArm:
         mujoco.mj_step2(self.model, self.data)
 
     def check(self) -> None:
-        """Refuse to continue from a bad state. For every frame: it costs some 1 us.
+        """Refuse to continue from a bad state. For every frame: it costs some 0.5 us.
 
         MuJoCo's own answer, a silent reset to the start, is switched off in the model.
 
@@ -179,34 +185,10 @@ class DrivenArm:
             ArmError: a joint's angle or speed is not finite, it turns by more than
                 `LARGEST_JOINT_STEP` in a step, or MuJoCo has warned.
         """
-        data = self.data
-        angles, speeds = self._qpos.tolist(), self._qvel.tolist()
-        # A sum is finite only if all its parts are, and costs less than a test of each.
-        if not math.isfinite(sum(angles) + sum(speeds)):
-            bad = ~(np.isfinite(data.qpos) & np.isfinite(data.qvel))
-            names = ", ".join(np.array(self.joints)[bad]) or "all, by overflow"
-            raise ArmError(
-                f"at t = {data.time:.4f} s the arm's state is not finite (joints: {names})"
-            )
-        before, self._angles = self._angles or angles, angles
-        # Norms are at least as large as what each joint does, and cost a third as much.
-        if (
-            math.hypot(*speeds) * self._dt > LARGEST_JOINT_STEP
-            and max(map(abs, speeds)) * self._dt > LARGEST_JOINT_STEP
+        if not self._take_state.call(
+            self._qpos, self._qvel, self._angles, self._n_warnings, self._dt
         ):
-            self._refuse_motion(self._dt * data.qvel, self.model.dof_jntid)
-        if (
-            math.dist(angles, before) > LARGEST_JOINT_STEP
-            and max(map(abs, map(operator.sub, angles, before))) > LARGEST_JOINT_STEP
-        ):
-            joints = np.repeat(
-                np.arange(self.model.njnt), np.diff(self.model.jnt_qposadr, append=self.model.nq)
-            )
-            self._refuse_motion(np.subtract(angles, before), joints)
-        if any(self._n_warnings.tolist()):
-            kind = mujoco.mjtWarning(int(np.argmax(self._n_warnings)))
-            text = mujoco.mju_warningText(kind, int(data.warning.lastinfo[kind]))
-            raise ArmError(f"at t = {data.time:.4f} s MuJoCo warned: {text}")
+            self._refuse_state()
 
     def check_if_set(self) -> None:
         """Check the state again if its angles are not those of the last check: others set them.
@@ -214,8 +196,28 @@ class DrivenArm:
         Raises:
             ArmError: see `check`.
         """
-        if self._qpos.tolist() != self._angles:
+        now, before = self._bytes
+        if now != before:
             self.check()
+
+    def _refuse_state(self) -> NoReturn:
+        """Raise the error of a bad state."""
+        data, model = self.data, self.model
+        if not math.isfinite(sum(self._qpos.tolist()) + sum(self._qvel.tolist())):
+            bad = ~(np.isfinite(data.qpos) & np.isfinite(data.qvel))
+            names = ", ".join(np.array(self.joints)[bad]) or "all, by overflow"
+            raise ArmError(
+                f"at t = {data.time:.4f} s the arm's state is not finite (joints: {names})"
+            )
+        turned, self._angles[:] = self._qpos - self._angles, self._qpos
+        if np.abs(self._qvel).max() * self._dt > LARGEST_JOINT_STEP:
+            self._refuse_motion(self._dt * data.qvel, model.dof_jntid)
+        if np.nanmax(np.abs(turned), initial=0.0) > LARGEST_JOINT_STEP:
+            n_numbers = np.diff(model.jnt_qposadr, append=model.nq)
+            self._refuse_motion(turned, np.repeat(np.arange(model.njnt), n_numbers))
+        kind = mujoco.mjtWarning(int(np.argmax(self._n_warnings)))
+        text = mujoco.mju_warningText(kind, int(data.warning.lastinfo[kind]))
+        raise ArmError(f"at t = {data.time:.4f} s MuJoCo warned: {text}")
 
     def _refuse_motion(self, ways: FloatArray, joints: FloatArray) -> NoReturn:
         """Raise the error of a joint that moves too far in a step.
@@ -231,6 +233,39 @@ class DrivenArm:
             f"{LARGEST_JOINT_STEP:g} makes sense. Something pushed the arm, or set its "
             "state: `reset` puts it elsewhere"
         )
+
+
+@kernel
+def _take_state(
+    angles: FloatArray, speeds: FloatArray, before: FloatArray, n_warnings: IntArray, dt: float
+) -> bool:
+    """Take the state of a step; return False, and do nothing, where `check` refuses it.
+
+    Args:
+        angles: Angles of the joints [rad], or how far they slide [m].
+        speeds: Their speeds.
+        before: Angles at the last check, which become the present ones.
+        n_warnings: How often MuJoCo has warned, by kind.
+        dt: Length of the step [s].
+    """
+    # A sum is finite only if all its parts are.
+    total_angle, total_speed = 0.0, 0.0
+    for i in range(len(angles)):
+        total_angle += angles[i]
+    for i in range(len(speeds)):
+        total_speed += speeds[i]
+    is_good = math.isfinite(total_angle + total_speed)
+    for i in range(len(speeds)):
+        is_good = is_good and not abs(speeds[i]) * dt > LARGEST_JOINT_STEP
+    for i in range(len(angles)):
+        is_good = is_good and not abs(angles[i] - before[i]) > LARGEST_JOINT_STEP
+    for i in range(len(n_warnings)):
+        is_good = is_good and n_warnings[i] == 0
+    if not is_good:
+        return False
+    for i in range(len(angles)):
+        before[i] = angles[i]
+    return True
 
 
 class Arm(DrivenArm):

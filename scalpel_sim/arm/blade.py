@@ -1,7 +1,6 @@
 """A blade on any MuJoCo arm: two sites become a segment, a wrench pushes their body."""
 
 import math
-import struct
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
@@ -10,13 +9,17 @@ import numpy as np
 
 from bridge import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
 from tissue import BladeSegment, FloatArray, Wrench
-
-_SIX = struct.Struct("6d")
+from tissue.support import SameTypes, kernel
 
 _SHORTEST_EDGE = 1e-4
 """Shortest cutting edge [m]. A shorter one is a mistake in the model: its direction is noise."""
 
+_SURELY_PLAUSIBLE = 0.999
+"""Share of the largest plausible force and torque up to which a kernel may apply a wrench: its
+rounding differs from that of the exact test by 1e-15."""
+
 SixNumbers = tuple[float, float, float, float, float, float]
+_Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class BladeError(ValueError):
@@ -77,22 +80,22 @@ class Blade:
             )
         self.body_id = body_id
         """MuJoCo's number for the body that feels the wrench."""
-        self._forward = _across(edge / self.length, np.array(forward, np.float64)).tolist()
+        self._forward = _across(edge / self.length, np.array(forward, np.float64))
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._heel = data.site_xpos[heel_id]
         self._tip = data.site_xpos[tip_id]
         self._rotation = data.xmat[body_id].reshape(3, 3)
         self._centre_of_mass = data.xipos[body_id]
-        self._applied = data.xfrc_applied[body_id].data.cast("B")
+        self._applied = data.xfrc_applied[body_id]
+        self._edge, self._push = SameTypes(_edge), SameTypes(_push)
+        # Compiled for floats, and before the first frame.
+        self._edge.call(self._rotation, self._forward, self._tip, self._heel)
+        self._push.call((0.0,) * 9, self._centre_of_mass, np.zeros(6))
 
     def segment(self) -> BladeSegment:
         """Return the edge as it is now, in the world frame. Copies."""
-        (a, b, c), (d, e, f), (g, h, i) = self._rotation.tolist()
-        x, y, z = self._forward
-        tx, ty, tz = self._tip.tolist()
-        hx, hy, hz = self._heel.tolist()
-        fx, fy, fz = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-        return BladeSegment.of_numbers((tx, ty, tz, hx, hy, hz, fx, fy, fz))
+        numbers = self._edge.call(self._rotation, self._forward, self._tip, self._heel)
+        return BladeSegment.of_numbers(numbers)
 
     def apply(self, wrench: Wrench) -> None:
         """Apply a wrench to the blade until the next call.
@@ -107,11 +110,61 @@ class Blade:
                 `MAX_PLAUSIBLE_TORQUE`.
                 The wrench of the call before stays applied.
         """
+        if self._push.call(wrench.numbers, self._centre_of_mass, self._applied):
+            return
         try:
-            six = about_centre_of_mass(wrench, self._centre_of_mass)
+            self._applied[:] = about_centre_of_mass(wrench, self._centre_of_mass)
         except ValueError as error:
             raise BladeError(f"the blade: {error}") from error
-        _SIX.pack_into(self._applied, 0, *six)
+
+
+@kernel
+def _edge(rotation: FloatArray, forward: FloatArray, tip: FloatArray, heel: FloatArray) -> _Nine:
+    """Return tip [m], heel [m] and the direction in which an edge cuts, world frame.
+
+    Args:
+        rotation: Axes of the body as columns.
+        forward: That direction in the frame of the body.
+        tip: The tip [m].
+        heel: The heel [m].
+    """
+    x, y, z = forward[0], forward[1], forward[2]
+    return (
+        tip[0],
+        tip[1],
+        tip[2],
+        heel[0],
+        heel[1],
+        heel[2],
+        rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z,
+        rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z,
+        rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z,
+    )
+
+
+@kernel
+def _push(wrench: _Nine, centre_of_mass: FloatArray, applied: FloatArray) -> bool:
+    """Write `about_centre_of_mass`; return False, and do nothing, where it may be implausible.
+
+    Args:
+        wrench: Force [N], torque [N m] and their point [m].
+        centre_of_mass: Of the body [m].
+        applied: Force and torque on the body.
+    """
+    fx, fy, fz, tx, ty, tz, x, y, z = wrench
+    x, y, z = x - centre_of_mass[0], y - centre_of_mass[1], z - centre_of_mass[2]
+    tx += y * fz - z * fy
+    ty += z * fx - x * fz
+    tz += x * fy - y * fx
+    force, torque = math.sqrt(fx * fx + fy * fy + fz * fz), math.sqrt(tx * tx + ty * ty + tz * tz)
+    if not (
+        force <= _SURELY_PLAUSIBLE * MAX_PLAUSIBLE_FORCE
+        and torque <= _SURELY_PLAUSIBLE * MAX_PLAUSIBLE_TORQUE
+    ):  # catches NaN too
+        return False
+    applied[0], applied[1], applied[2] = fx, fy, fz
+    applied[3], applied[4], applied[5] = tx, ty, tz
+    return True
 
 
 def number_in(
