@@ -24,7 +24,7 @@ from bridge.coupling.virtual_coupling import VirtualCoupling
 from bridge.driven import FrameAttachment, FrameLoad, FrameTie, GeomPoses, plain_region
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink, TissueLink, link_to
-from bridge.poses import Pose, checked_pose, finite
+from bridge.poses import Pose, expect_plane, finite, pose_of, pose_of_numbers
 from tissue import BladeSegment, BladeSweep, Geom, Snapshot, StepResult, Wrench
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
@@ -137,11 +137,7 @@ class Bridge:
         """
         if not (dt > 0.0 and math.isfinite(dt)):
             raise ValueError(f"the frame lasts {dt} s; it must be positive and finite")
-        arithmetic, before = self._arithmetic, self._arm
-        arm = checked_pose(self._frame.segment_to_tissue(segment), segment, arithmetic)
-        before = arm if before is None else before
-        arm_motion = arithmetic.motion.call(before.tip, before.axes, arm.tip, arm.axes)
-        expect_plausible_motion(arm_motion, dt)
+        arm, arm_motion = self._arrived(segment, dt)
         self._arm = arm
         self._n_frames += 1
         if self._is_direct and not self._path:
@@ -155,6 +151,25 @@ class Bridge:
         self._raw_is_felt = felt is raw
         self._felt = self._frame.numbers_to_world(felt, arm.tip)
         return self._felt
+
+    def _arrived(self, given: BladeSegment, dt: float) -> tuple[Pose, Six]:
+        """Return the checked pose of the blade, and its motion since the last frame of `dt` [s]."""
+        frame, before, segment = self._frame, self._arm, given
+        origin = frame.numbers_of_origin
+        if frame.is_rotated:
+            segment, origin = frame.segment_to_tissue(given), (0.0, 0.0, 0.0)
+        if before is None:
+            at_rest = frame.segment_to_tissue(given)
+            expect_plane(at_rest, given)
+            before = pose_of(at_rest)
+        is_plausible, numbers, axes, motion = self._arithmetic.arrival.call(
+            segment.numbers, origin, before.tip, before.axes, dt
+        )
+        arm = pose_of_numbers(numbers, axes)
+        if not is_plausible:
+            expect_plane(arm.segment, given)
+            expect_plausible_motion(motion, dt)
+        return arm, motion
 
     def attach(
         self,
@@ -293,15 +308,18 @@ class Bridge:
         """Advance the tissue by this frame, where it answers in each, and return its wrench."""
         before, engaged = self._queried_at or arm, self._engaged()
         driven = self._driven.poses
-        # It stays where a link fails: the next frame then does both.
-        self._path.append(PathPart(arm, dt, driven))
-        touches, self.touching = self._broad_phase.overlaps(before, arm, dt, engaged=engaged)
-        self._n_rejected += not touches
-        sweep = BladeSweep(before.segment, arm.segment) if touches else None
-        result = self._query.step(sweep, dt, driven)
-        self._queried_at = arm
-        self._driven.take(loads_over(self._link), result)
-        self._path.clear()
+        try:
+            touches, self.touching = self._broad_phase.overlaps(before, arm, dt, engaged=engaged)
+            self._n_rejected += not touches
+            sweep = BladeSweep(before.segment, arm.segment) if touches else None
+            result = self._query.step(sweep, dt, driven)
+            self._queried_at = arm
+            if self._driven.are_loaded:
+                self._driven.take(loads_over(self._link), result)
+        except BaseException:
+            # The next frame then does both.
+            self._path.append(PathPart(arm, dt, driven))
+            raise
         self._take(result, dt)
         self.answered = True
         return _about_tip(result)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bridge.arithmetic import Six, Triple
+from bridge.arithmetic import Six, Three, Triple
 from bridge.collision.fixtures import Fixture, FixtureBox
 from bridge.poses import finite, rotation
 from tissue import BladeSegment, FloatArray, Wrench
@@ -28,14 +28,14 @@ class TissueFrame:
     is_rotated: bool = field(init=False, repr=False, default=True)
     """Whether the rotation differs from the identity. Mostly it does not, and the products are
     skipped."""
-    _place: Triple = field(init=False, repr=False, default=())
-    """The origin in plain numbers."""
+    numbers_of_origin: Three = field(init=False, repr=False, default=(0.0, 0.0, 0.0))
+    """The origin in plain numbers [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotation(self.rotation, "the tissue's rotation"))
         object.__setattr__(self, "origin", finite(self.origin, (3,), "the tissue's origin"))
         object.__setattr__(self, "is_rotated", bool((self.rotation != np.eye(3)).any()))
-        object.__setattr__(self, "_place", tuple(self.origin.tolist()))
+        object.__setattr__(self, "numbers_of_origin", tuple(self.origin.tolist()))
         self.rotation.setflags(write=False)
         self.origin.setflags(write=False)
 
@@ -62,7 +62,7 @@ class TissueFrame:
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
         if not self.is_rotated:
-            x, y, z = self._place
+            x, y, z = self.numbers_of_origin
             a, b, c, d, e, f, u, v, w = segment.numbers
             return BladeSegment.of_numbers((a - x, b - y, c - z, d - x, e - y, f - z, u, v, w))
         tip, heel, forward = segment
@@ -75,7 +75,7 @@ class TissueFrame:
     def segment_to_world(self, segment: BladeSegment) -> BladeSegment:
         """Return a segment of the tissue frame in the world."""
         if not self.is_rotated:
-            x, y, z = self._place
+            x, y, z = self.numbers_of_origin
             a, b, c, d, e, f, u, v, w = segment.numbers
             return BladeSegment.of_numbers((a + x, b + y, c + z, d + x, e + y, f + z, u, v, w))
         tip, heel, forward = segment
@@ -88,7 +88,7 @@ class TissueFrame:
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
         """Return a wrench of the tissue frame in the world, about the same point."""
         if not self.is_rotated:
-            x, y, z = self._place
+            x, y, z = self.numbers_of_origin
             fx, fy, fz, tx, ty, tz, px, py, pz = wrench.numbers
             return Wrench.of_numbers((fx, fy, fz, tx, ty, tz, px + x, py + y, pz + z))
         force, torque, point = wrench
@@ -103,7 +103,7 @@ class TissueFrame:
         px, py, pz = point
         if self.is_rotated:
             return self.wrench_to_world(Wrench.of_numbers((*wrench, px, py, pz)))
-        x, y, z = self._place
+        x, y, z = self.numbers_of_origin
         return Wrench.of_numbers((*wrench, px + x, py + y, pz + z))
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:

@@ -8,7 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridge.arithmetic import PLAIN, Arithmetic, Axes, Six, Three, axes_of, motion_between
+from bridge.arithmetic import (
+    LARGEST_COSINE,
+    SHORTEST_EDGE,
+    UNIT_TOLERANCE,
+    Axes,
+    SegmentNumbers,
+    Six,
+    Three,
+    arrival,
+)
 from tissue import BladeSegment, FloatArray, checked_rotation
 
 FRAME_TOLERANCE = 1e-9
@@ -16,15 +25,8 @@ FRAME_TOLERANCE = 1e-9
 accurate to 1e-15, and a quaternion typed with ten digits to 1e-10; at 1e-6 the length of the blade
 would differ between the frames by more than an anchor moves in a step."""
 
-_SHORTEST_EDGE = 1e-6
-"""Shortest cutting edge [m]: a shorter one has no direction to align a swept box with."""
-
-_LARGEST_COSINE = 0.99
-"""Largest cosine of the angle between `forward` and the edge. `forward` should be across the edge
-(0); at less than eight degrees the plane of the blade is ill-conditioned."""
-
-_UNIT_TOLERANCE = 1e-6
-"""Largest difference of the length of `forward` from 1: the accuracy of single precision."""
+_ORIGIN: Three = (0.0, 0.0, 0.0)
+_AXES: Axes = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def six(array: FloatArray) -> Six:
@@ -42,48 +44,50 @@ class Pose(NamedTuple):
     """The tip [m]."""
     heel: Three
     """The heel [m]."""
-    length: float
-    """Length of the edge [m]."""
     axes: Axes
     """Axes of the blade."""
+
+    @property
+    def length(self) -> float:
+        """Length of the edge [m]."""
+        return math.dist(self.tip, self.heel)
+
+
+def pose_of_numbers(numbers: SegmentNumbers, axes: Axes) -> Pose:
+    """Return the pose of a blade with these axes."""
+    return Pose(BladeSegment.of_numbers(numbers), numbers[:3], numbers[3:6], axes)
 
 
 def pose_of(segment: BladeSegment) -> Pose:
     """Return the pose of a segment that is known to have a plane."""
-    tx, ty, tz, hx, hy, hz, fx, fy, fz = segment.numbers
-    tip, heel = (tx, ty, tz), (hx, hy, hz)
-    return Pose(segment, tip, heel, math.dist(tip, heel), axes_of(tip, heel, (fx, fy, fz)))
+    _, numbers, axes, _ = arrival(segment.numbers, _ORIGIN, _ORIGIN, _AXES, 0.0)
+    return Pose(segment, numbers[:3], numbers[3:6], axes)
 
 
-def checked_pose(
-    segment: BladeSegment, given: BladeSegment, arithmetic: Arithmetic = PLAIN
-) -> Pose:
-    """Return the pose of a segment, after a check that it is finite and has a plane.
+def expect_plane(segment: BladeSegment, given: BladeSegment) -> None:
+    """Refuse a pose that is not finite, or has no plane.
 
     Args:
         segment: The pose.
         given: The pose as the user of the bridge gave it, for the message.
-        arithmetic: What finds its axes.
 
     Raises:
         ValueError: the pose is not finite, or its edge and `forward` span no plane.
     """
     tx, ty, tz, hx, hy, hz, fx, fy, fz = segment.numbers
-    tip, heel, forward = (tx, ty, tz), (hx, hy, hz), (fx, fy, fz)
-    length, forward_length = math.dist(tip, heel), math.hypot(*forward)
+    length, forward_length = math.dist((tx, ty, tz), (hx, hy, hz)), math.hypot(fx, fy, fz)
     if not math.isfinite(length + forward_length):
         raise ValueError(f"the blade's pose is not finite: {given}")
-    if length < _SHORTEST_EDGE:
-        raise ValueError(f"the cutting edge is {length} m long; at least {_SHORTEST_EDGE} m")
-    if abs(forward_length - 1.0) > _UNIT_TOLERANCE:
+    if length < SHORTEST_EDGE:
+        raise ValueError(f"the cutting edge is {length} m long; at least {SHORTEST_EDGE} m")
+    if abs(forward_length - 1.0) > UNIT_TOLERANCE:
         raise ValueError(f"forward must be a unit vector; its length is {forward_length}")
     cosine = abs((tx - hx) * fx + (ty - hy) * fy + (tz - hz) * fz) / length
-    if cosine > _LARGEST_COSINE:
+    if cosine > LARGEST_COSINE:
         raise ValueError(
             f"forward must be across the edge; they are {math.degrees(math.acos(cosine)):.2g} "
             "degrees apart"
         )
-    return Pose(segment, tip, heel, length, arithmetic.axes.call(tip, heel, forward))
 
 
 def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
@@ -92,8 +96,8 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
     The rotation carries edge and flat of the first pose to those of the second, by less than half
     a turn.
     """
-    one, other = pose_of(before), pose_of(after)
-    return np.array(motion_between(one.tip, one.axes, other.tip, other.axes))
+    one = pose_of(before)
+    return np.array(arrival(after.numbers, _ORIGIN, one.tip, one.axes, 0.0)[3])
 
 
 def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:

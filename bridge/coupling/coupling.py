@@ -6,7 +6,15 @@ from typing import NoReturn
 
 import numpy as np
 
-from bridge.arithmetic import PLAIN, Arithmetic, Six, Triple
+from bridge.arithmetic import (
+    CLEARLY,
+    MAX_PLAUSIBLE_SPEED,
+    MAX_PLAUSIBLE_TURN,
+    PLAIN,
+    Arithmetic,
+    Six,
+    Triple,
+)
 from bridge.coupling.limits import DeviceLimits, factor_to_limit
 from bridge.coupling.passivity import Passivity, PassivityCounters, Travel
 from bridge.poses import six
@@ -20,13 +28,6 @@ still be the hardest push of the device, so it is replaced by zero."""
 
 MAX_PLAUSIBLE_TORQUE = 1e2
 """Largest plausible torque [N m]: that force at a lever of 0.1 m, the length of a scalpel."""
-
-MAX_PLAUSIBLE_SPEED = 100.0
-"""Largest plausible speed of the tip of a blade [m/s]: ten times that of a hand. Faster, the arm
-was put elsewhere or diverges, and the blade would pass through the tissue in a frame."""
-
-MAX_PLAUSIBLE_TURN = 0.5 * math.pi
-"""Largest plausible turn of a blade in a frame [rad]: beyond, its path is a guess."""
 
 MAX_IMPLAUSIBLE_FRAMES = 10
 """Frames in a row with an implausible wrench after which the run stops: 10 ms at 1 kHz. A single
@@ -84,6 +85,11 @@ class Coupling:
         self._limits = limits
         self._watchdog = Watchdog()
         self._passivity = Passivity(limits, passivity, arithmetic)
+        # Up to these force [N] and torque [N m] nothing needs to act.
+        self._clear = (
+            CLEARLY * min(limits.force, MAX_PLAUSIBLE_FORCE),
+            CLEARLY * min(limits.torque, MAX_PLAUSIBLE_TORQUE),
+        )
         self._felt = _NO_WRENCH
         self._n_implausible_in_a_row = 0
         self.n_force_limited = 0
@@ -105,6 +111,17 @@ class Coupling:
         Raises:
             CouplingError: the wrench is not finite, or was implausible for too long.
         """
+        x, y, z = point
+        if (
+            silence == 0.0
+            and self._watchdog.is_idle
+            and self._limits.slew == math.inf
+            and math.isfinite(x + y + z)
+            and self._passivity.pass_on(wrench, travel, *self._clear)
+        ):
+            self._n_implausible_in_a_row = 0
+            self._felt = wrench
+            return wrench
         fx, fy, fz, tx, ty, tz = wrench
         force_size, torque_size = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
         if not math.isfinite(force_size + torque_size + math.hypot(*point)):
@@ -250,6 +267,11 @@ class Watchdog:
         self._gain = min(allowed, self._gain + dt / RAMP)
         self.n_faded += self._gain < 1.0
         return self._gain
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether the factor is 1, and the tissue was not silent in the last frame."""
+        return self._gain == 1.0 and not self._is_silent
 
     def reset(self) -> None:
         """Set the factor to zero; it rises again over `RAMP`."""

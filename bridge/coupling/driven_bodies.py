@@ -200,6 +200,11 @@ class DrivenBodies:
         frames = tuple([frame.pose for frame in self._frames])
         return DrivenPoses(frames, NO_GEOMS if self._contact is None else self._contact.poses)
 
+    @property
+    def are_loaded(self) -> bool:
+        """Whether the tissue's next answer has loads on anything."""
+        return bool(self.loads or self._contact)
+
     def attach(self, attachment: FrameAttachment) -> DrivenFrame:
         """Attach a frame to tissue; see `TissueLink.attach`."""
         return self._added(self._link.attach(attachment))

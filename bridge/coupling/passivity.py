@@ -95,6 +95,36 @@ class Passivity:
         self._injected = 0.0
         self._n_acted = 0
 
+    def pass_on(self, wanted: Six, travel: Travel, force: float, torque: float) -> bool:
+        """Do `correct` and `record` where that changes nothing; else return False, and do nothing.
+
+        Args:
+            wanted: Force [N] and torque about the tip [N m].
+            travel: Motion and work of the blade since the last frame.
+            force: Force up to which it is within all limits [N].
+            torque: Torque likewise [N m].
+        """
+        _, at_start, given, _, power, most, after, force_size, torque_size = self._balance.call(
+            self._felt,
+            wanted,
+            travel.motion,
+            self._energy,
+            self._work_at_start,
+            travel.work_on_tissue,
+        )
+        # What is not finite passes no comparison.
+        if not (
+            force_size <= force
+            and torque_size <= torque
+            and (power <= most or not self._acts)
+            and self._taken is _ZERO_WRENCH
+        ):
+            return False
+        self._energy, self._work_at_start, self._given = after, at_start, given
+        self._least = min(self._least, after - given)
+        self._felt = wanted
+        return True
+
     def correct(self, wanted: Six, travel: Travel) -> Six:
         """Return the wrench that may be felt from now on. Call `record` afterwards.
 
@@ -110,7 +140,7 @@ class Passivity:
             self._work_at_start,
             travel.work_on_tissue,
         )
-        self._energy, self._work_at_start, self._given, spent, power, most, after = balance
+        self._energy, self._work_at_start, self._given, spent, power, most, after = balance[:7]
         self._energy_after = after
         if power <= most or not self._acts:
             return wanted
