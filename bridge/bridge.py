@@ -137,31 +137,31 @@ class Bridge:
         """
         if not (dt > 0.0 and math.isfinite(dt)):
             raise ValueError(f"the frame lasts {dt} s; it must be positive and finite")
-        arm, arm_motion = self._arrived(segment, dt)
+        arm, motion = self._arrived(segment, dt)
         self._arm = arm
         self._n_frames += 1
         if self._is_direct and not self._path:
             raw = self._advance(arm, dt)
         else:
             raw = self._consult(arm, dt)
-        work = 0.0 if self.result is None else self.result.work_of_blade
-        travel = Travel(arm_motion, 0.5 * arm.length, work)
         self._raw, self._raw_is_felt = raw, False
-        felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
+        work, felt = 0.0 if self.result is None else self.result.work_of_blade, raw
+        if not self._coupling.passes(raw, motion, work, self._silence):
+            travel = Travel(motion, 0.5 * arm.length, work)
+            felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
         self._raw_is_felt = felt is raw
         self._felt = self._frame.numbers_to_world(felt, arm.tip)
         return self._felt
 
     def _arrived(self, given: BladeSegment, dt: float) -> tuple[Pose, Six]:
         """Return the checked pose of the blade, and its motion since the last frame of `dt` [s]."""
-        frame, before, segment = self._frame, self._arm, given
-        origin = frame.numbers_of_origin
+        frame, before = self._frame, self._arm
+        segment, origin = given, frame.numbers_of_origin
         if frame.is_rotated:
             segment, origin = frame.segment_to_tissue(given), (0.0, 0.0, 0.0)
         if before is None:
-            at_rest = frame.segment_to_tissue(given)
-            expect_plane(at_rest, given)
-            before = pose_of(at_rest)
+            expect_plane(frame.segment_to_tissue(given), given)
+            before = pose_of(frame.segment_to_tissue(given))
         is_plausible, numbers, axes, motion = self._arithmetic.arrival.call(
             segment.numbers, origin, before.tip, before.axes, dt
         )
@@ -317,8 +317,7 @@ class Bridge:
             if self._driven.are_loaded:
                 self._driven.take(loads_over(self._link), result)
         except BaseException:
-            # The next frame then does both.
-            self._path.append(PathPart(arm, dt, driven))
+            self._path.append(PathPart(arm, dt, driven))  # the next frame does both
             raise
         self._take(result, dt)
         self.answered = True
@@ -370,7 +369,8 @@ class Bridge:
             CouplingError: a node is not finite.
         """
         low, high = result.bounds.tolist()
-        if not math.isfinite(sum(low) + sum(high)):
+        (ax, ay, az), (bx, by, bz) = low, high
+        if not math.isfinite(ax + ay + az + bx + by + bz):
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
         self._broad_phase.update_bounds((low, high), seconds)
         before = 0.0 if self.result is None else self.result.anchored_length

@@ -104,7 +104,8 @@ class TissueFrame:
         if self.is_rotated:
             return self.wrench_to_world(Wrench.of_numbers((*wrench, px, py, pz)))
         x, y, z = self.numbers_of_origin
-        return Wrench.of_numbers((*wrench, px + x, py + y, pz + z))
+        fx, fy, fz, tx, ty, tz = wrench
+        return Wrench.of_numbers((fx, fy, fz, tx, ty, tz, px + x, py + y, pz + z))
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
         """Return a fixture given in the world in the tissue frame."""

@@ -215,10 +215,9 @@ class InProcessLink:
         geoms: GeomPoses = NO_GEOMS,
     ) -> StepResult:
         """Advance the tissue by `dt` [s]; see `TissueLink.step`."""
-        driven = self._frames[self._n_own :]
-        if poses or driven:
-            expect_each(poses, len(driven))
-            for frame, pose in zip(driven, poses, strict=True):
+        if poses or self.n_driven:
+            expect_each(poses, self.n_driven)
+            for frame, pose in zip(self._frames[self._n_own :], poses, strict=True):
                 frame.move(pose.origin, pose.rotation)
         if geoms is not NO_GEOMS or self._geoms is not None:
             expect_pose_of_each(geoms, self._n_geoms)

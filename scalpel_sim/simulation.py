@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
+from bridge import Bridge, Fixture, InProcessLink, TissueFrame, TissueLink, VirtualCoupling
 from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.instruments.blade_instrument import BladeInstrument
@@ -19,11 +19,11 @@ from scalpel_sim.recording.columns import (
     FrameData,
     WallTimes,
     columns_of,
-    frame_row,
     held_group,
 )
 from scalpel_sim.recording.observations import MaterialSamples, observed, result_at_rest
 from scalpel_sim.recording.recording import Recording
+from scalpel_sim.recording.row_writer import RowWriter
 from scalpel_sim.state import SimulationState, StartState
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, StageTimes, StateError, StepResult, Wrench
@@ -119,6 +119,8 @@ class Simulation:
         self._groups = [group for group in groups if group.quantities]
         self.recording = Recording(columns_of(self._groups))
         """Rows of the frames so far."""
+        is_parallel = isinstance(self.link, InProcessLink) and not self.frame.is_rotated
+        self._rows = RowWriter(self._groups, self.recording, is_parallel)
 
     @property
     def stroke(self) -> Stroke:
@@ -207,7 +209,7 @@ class Simulation:
             if result is not None and self.bridge.answered:
                 stages = result.stage_times
             self._wall_times = WallTimes(*stages, drawn - done, done - start)
-            self._record(drawn)
+            self._rows.append(self._frame(drawn))
         self.wall_seconds += time.perf_counter() - start
         return blade.wrench
 
@@ -290,10 +292,6 @@ class Simulation:
             self._wall_times,
             recorded_since,
         )
-
-    def _record(self, since: float) -> None:
-        """Add the last frame to the recording, which began at that wall clock [s]."""
-        self.recording.append(frame_row(self._groups, self._frame(since)))
 
     def run(self, seconds: float, every_frame: EveryFrame | None = None) -> None:
         """Do frames until `seconds` of simulated time have passed or `every_frame` returns True."""

@@ -41,7 +41,7 @@ _RULES = StateRules(
         f"Simulation.{name}"
         for name in (
             *("recording", "records", "n_frames", "pictures", "wall_seconds"),
-            *("_shared", "_groups", "samples", "_wall_times", "_start"),
+            *("_shared", "_groups", "_rows", "samples", "_wall_times", "_start"),
         )
     ),
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the

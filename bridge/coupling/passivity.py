@@ -95,22 +95,18 @@ class Passivity:
         self._injected = 0.0
         self._n_acted = 0
 
-    def pass_on(self, wanted: Six, travel: Travel, force: float, torque: float) -> bool:
+    def pass_on(self, wanted: Six, motion: Six, work: float, limits: tuple[float, float]) -> bool:
         """Do `correct` and `record` where that changes nothing; else return False, and do nothing.
 
         Args:
             wanted: Force [N] and torque about the tip [N m].
-            travel: Motion and work of the blade since the last frame.
-            force: Force up to which it is within all limits [N].
-            torque: Torque likewise [N m].
+            motion: See `Travel`.
+            work: Work of the blade on the tissue [J]; see `Travel`.
+            limits: Force [N] and torque [N m] up to which no limit acts.
         """
+        force, torque = limits
         _, at_start, given, _, power, most, after, force_size, torque_size = self._balance.call(
-            self._felt,
-            wanted,
-            travel.motion,
-            self._energy,
-            self._work_at_start,
-            travel.work_on_tissue,
+            self._felt, wanted, motion, self._energy, self._work_at_start, work
         )
         # What is not finite passes no comparison.
         if not (
@@ -121,7 +117,8 @@ class Passivity:
         ):
             return False
         self._energy, self._work_at_start, self._given = after, at_start, given
-        self._least = min(self._least, after - given)
+        if after - given < self._least:
+            self._least = after - given
         self._felt = wanted
         return True
 

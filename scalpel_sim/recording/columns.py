@@ -154,22 +154,12 @@ def _motion(frame: FrameData) -> list[float]:
 
 def _force_parts(frame: FrameData) -> list[float]:
     """Return the parts of the force [N], and the stiffness against displacement [N/m]."""
-    there, blade, result = frame.tissue_frame, frame.blade, frame.result
-    contacts, numbers = result.contacts_of_blade, np.empty(15)
-    if there.is_rotated:
-        parts = force_parts(contacts, there.vectors_to_tissue(blade.forward))
-        numbers[:9] = there.vectors_to_world(np.array(parts)).ravel()
-        _write_upper(there.matrix_to_world(result.stiffness[:3, :3]), numbers)
-    else:
-        _write_at_blade(
-            contacts.normal,
-            contacts.normal_force,
-            contacts.friction,
-            result.stiffness,
-            *blade.numbers[6:],
-            numbers,
-        )
-    return numbers.tolist()
+    there, result = frame.tissue_frame, frame.result
+    forward = there.vectors_to_tissue(frame.blade.forward)
+    parts = np.array(force_parts(result.contacts_of_blade, forward))
+    stiffness = there.matrix_to_world(result.stiffness[:3, :3])
+    xx, xy, xz, _, yy, yz, _, _, zz = stiffness.ravel().tolist()
+    return [*there.vectors_to_world(parts).ravel().tolist(), xx, yy, zz, xy, xz, yz]
 
 
 def _cut(frame: FrameData) -> tuple[float, ...]:
@@ -243,35 +233,6 @@ and without the recording of its row (`recording_s`: of the columns up to there)
 def shared_columns() -> tuple[str, ...]:
     """Return the names of the columns that each run has."""
     return columns_of(COLUMNS.values())
-
-
-@kernel
-def _write_at_blade(
-    normal: FloatArray,
-    normal_force: FloatArray,
-    friction: FloatArray,
-    stiffness: FloatArray,
-    x: float,
-    y: float,
-    z: float,
-    numbers: FloatArray,
-) -> None:
-    """Write `ForceParts` and stiffness of a step, whose frame is parallel to the world.
-
-    `x`, `y`, `z`: unit vector in which the blade cuts. As an array it would have to be made.
-    """
-    add_up(normal, normal_force, friction, (x, y, z), numbers)
-    _write_upper(stiffness, numbers)
-
-
-@kernel
-def _write_upper(stiffness: FloatArray, numbers: FloatArray) -> None:
-    """Write the six different numbers of the stiffness against displacement."""
-    for axis in range(3):
-        numbers[9 + axis] = stiffness[axis, axis]
-    numbers[12] = stiffness[0, 1]
-    numbers[13] = stiffness[0, 2]
-    numbers[14] = stiffness[1, 2]
 
 
 class ForceParts(NamedTuple):

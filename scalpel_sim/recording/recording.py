@@ -79,6 +79,10 @@ class Recording:
         self._store = RowStore(len(self.columns))
         self.append = self._store.append
         """Add one frame: a number for each of `columns`."""
+        self.room_for_a_row = self._store.room_for_a_row
+        """Return where to write the first numbers of a frame, before `end_row`: rows, and which."""
+        self.end_row = self._store.end_row
+        """Add a frame of which so many numbers have been written, and these are the others."""
         self.cut_back = self._store.cut_back
         """Forget all frames but the first so many, of which there are as many."""
         self.since = self._store.since
@@ -251,8 +255,8 @@ class RowStore:
     def __init__(self, n_columns: int, folder: Path | None = None) -> None:
         self.folder = folder
         """Where the file will be made; see `RowStore`."""
-        self._row = struct.Struct(f"{n_columns}d")
         self._shape = (-1, n_columns)
+        self._row_bytes = 8 * n_columns
         self._n = self._first = 0
         """Number of rows, and the number of the first that is in memory."""
         self._file: FileIO | None = None
@@ -276,14 +280,33 @@ class RowStore:
         Raises:
             RunError: the file cannot be written. The rows before are kept.
         """
+        self.room_for_a_row()
+        self.end_row(0, row)
+
+    def room_for_a_row(self) -> tuple[FloatArray, int]:
+        """Return the rows in memory, and the number of the next one among them.
+
+        Raises:
+            RunError: see `append`.
+        """
         at = self._n - self._first
         if at == len(self._room):
             self._write()
             if at > ROWS_PER_WRITE:
                 self._take_room(ROWS_PER_WRITE)
             self._first, at = self._n, 0
+        return self._room, at
+
+    def end_row(self, n_written: int, others: Sequence[float]) -> None:
+        """Add the row that begins with numbers that are written, and goes on with others.
+
+        Args:
+            n_written: How many were written into the room for it.
+            others: All that follow.
+        """
+        at, n = self._n - self._first, self._shape[1]
         # NumPy takes three times as long for fifty numbers of a list.
-        self._row.pack_into(self._memory, at * self._row.size, *row)
+        struct.pack_into(f"{n - n_written}d", self._memory, 8 * (at * n + n_written), *others)
         self._n += 1
 
     def cut_back(self, n_rows: int) -> None:
@@ -307,7 +330,7 @@ class RowStore:
         if not self._n:
             return np.zeros((0, self._shape[1]))
         self._write()
-        mapped = mmap.mmap(self._file.fileno(), self._n * self._row.size, access=mmap.ACCESS_READ)
+        mapped = mmap.mmap(self._file.fileno(), self._n * self._row_bytes, access=mmap.ACCESS_READ)
         return np.frombuffer(mapped).reshape(self._shape)
 
     def parts(self, first: int = 0) -> Iterator[FloatArray]:
@@ -323,18 +346,18 @@ class RowStore:
         part = np.empty((_ROWS_PER_READ, self._shape[1]))
         for begin in range(first, self._n, _ROWS_PER_READ):
             found = part[: min(_ROWS_PER_READ, self._n - begin)]
-            self._file.seek(begin * self._row.size)
+            self._file.seek(begin * self._row_bytes)
             if self._file.readinto(found.data.cast("B")) != found.nbytes:
                 raise RunError("the temporary file of the recording cannot be read")
             yield found
 
     def _write(self) -> None:
         """Write the rows that are in memory."""
-        left = self._memory[: (self._n - self._first) * self._row.size]
+        left = self._memory[: (self._n - self._first) * self._row_bytes]
         try:
             if self._file is None:
                 self._file = unnamed_file(self.folder)
-            self._file.seek(self._first * self._row.size)
+            self._file.seek(self._first * self._row_bytes)
             while left:
                 left = left[self._file.write(left) :]
         except OSError as error:
