@@ -50,7 +50,7 @@ _ABOUT_FIXED = (
 
 TIMED_PARTS = (
     "scalpel_sim.simulation:Simulation.step",
-    "scalpel_sim.simulation:Simulation._record",
+    "scalpel_sim.recording.row_writer:RowWriter.append",
     "scalpel_sim.arm.arm:Arm.step1",
     "scalpel_sim.arm.arm:Arm.step2",
     "scalpel_sim.arm.arm:Arm.check",

@@ -4,9 +4,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from bridge.arithmetic import compiled_arithmetic
+from bridge.arithmetic import (
+    LARGEST_COSINE,
+    MAX_PLAUSIBLE_SPEED,
+    MAX_PLAUSIBLE_TURN,
+    SHORTEST_EDGE,
+    UNIT_TOLERANCE,
+    arrival,
+    compiled_arithmetic,
+)
 from bridge.collision.swept_box import edge_axes
-from bridge.poses import half_length, motion, moved, pose_of
+from bridge.coupling.coupling import expect_plausible_motion
+from bridge.poses import expect_plane, half_length, motion, moved, pose_of
 from tissue import BladeSegment
 
 UPRIGHT = BladeSegment(np.zeros(3), np.array([0.0, 0.0, 0.04]), np.array([0.0, 1.0, 0.0]))
@@ -33,6 +42,37 @@ def test_a_motion_is_that_of_the_rotation_matrix(seed):
     arrived = after.numbers, (0.0, 0.0, 0.0), one.tip, one.axes, 1e-3
     again = compiled_arithmetic().arrival.call(*arrived)[3]
     assert again == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_clearly_plausible_passes_the_exact_tests(seed):
+    """Poses and motions on both sides of each limit, none of them clearly plausible beyond it."""
+    rng, n_plausible = np.random.default_rng(seed), 0
+    origin, dt = (0.1, 0.2, 0.3), 1e-3
+    for _ in range(200):
+        before, size = random_pose(rng), float(rng.choice([0.5, 0.985, 1.0, 1.5]))
+        kind = rng.integers(5)
+        by = np.zeros(6)
+        by[0] = size * MAX_PLAUSIBLE_SPEED * dt if kind == 0 else 1e-4
+        by[3] = size * MAX_PLAUSIBLE_TURN if kind == 1 else 1e-3
+        tip, heel, forward = moved(before, by)
+        edge = heel - tip
+        if kind == 2:
+            edge *= size * SHORTEST_EDGE / np.linalg.norm(edge)
+        elif kind == 3:
+            forward *= 1.0 + size * UNIT_TOLERANCE
+        elif kind == 4:
+            along, across = edge_axes(before)[:, 1], edge_axes(before)[:, 2]
+            cosine = min(size * LARGEST_COSINE, 1.0)
+            edge, forward = 0.04 * along, cosine * along + np.sqrt(1.0 - cosine**2) * across
+        after, one = BladeSegment(tip, tip + edge, forward), pose_of(before)
+        given = BladeSegment(after.tip + origin, after.heel + origin, forward)
+        is_plausible, numbers, _, by = arrival(given.numbers, origin, one.tip, one.axes, dt)
+        if is_plausible:
+            n_plausible += 1
+            expect_plane(BladeSegment.of_numbers(numbers), after)
+            expect_plausible_motion(by, dt)
+    assert 20 < n_plausible < 180
 
 
 @given(vectors, vectors)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import CouplingError
+from bridge.arithmetic import PLAIN, compiled_arithmetic
 from bridge.coupling.coupling import (
     MAX_IMPLAUSIBLE_FRAMES,
     MAX_PLAUSIBLE_FORCE,
@@ -82,6 +83,27 @@ def test_no_profile_exceeds_a_limit_or_changes_the_force_faster_than_the_slew_li
         assert math.hypot(*felt.force) <= 8.5
         assert math.hypot(*felt.torque) <= 0.188
         before = felt.force
+
+
+@pytest.mark.parametrize("is_compiled", [False, True])
+def test_a_wrench_that_passes_is_counted_as_one_that_is_felt(is_compiled):
+    """Forces around the limit, motions that would gain energy, and a tissue that is silent once."""
+    rng, arithmetic = np.random.default_rng(2), compiled_arithmetic() if is_compiled else PLAIN
+    short = Coupling(PREMIUM, arithmetic=arithmetic)
+    exact = Coupling(PREMIUM, arithmetic=arithmetic)
+    n_passed = 0
+    for i in range(400):
+        tissue = six(np.concatenate([rng.normal(0.0, 4.0, 3), rng.normal(0.0, 0.08, 3)]))
+        motion = six(np.concatenate([rng.normal(0.0, 1e-4, 3), rng.normal(0.0, 1e-3, 3)]))
+        travel, silence = Travel(motion, 0.02, -1e-4 * i), 0.06 if i == 100 else 0.0
+        rest = (0.0, 0.0, 0.0), 1e-3, travel, silence
+        felt = exact.felt(tissue, *rest)
+        passed = short.passes(tissue, motion, travel.work_on_tissue, silence)
+        n_passed += passed
+        assert felt == (tissue if passed else short.felt(tissue, *rest))
+        assert short.passivity == exact.passivity
+    assert 100 < n_passed < 300 and short.passivity.frames > 0
+    assert (short.n_force_limited, short.n_faded) == (exact.n_force_limited, exact.n_faded)
 
 
 def test_a_force_limited_in_its_rate_reaches_its_value():

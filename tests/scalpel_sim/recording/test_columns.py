@@ -14,6 +14,8 @@ from scalpel_sim.recording.columns import (
     frame_row,
     shared_columns,
 )
+from scalpel_sim.recording.recording import Recording
+from scalpel_sim.recording.row_writer import RowWriter
 from tissue import BladeSegment, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -72,3 +74,18 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
     assert row[25:31] == [stiffness[at] for at in AXES]
     assert row[31:36] == [1.0, 2.0, 3, 4.0, 5.0]
     assert row[-6:-1] == list(range(5)) and np.isnan(row[36:-6]).all()
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("n", [0, 1, 40])
+def test_a_row_that_a_kernel_writes_is_the_same(n):
+    rng, groups = np.random.default_rng(n), [*COLUMNS.values()]
+    blade = BladeSegment(*np.linalg.qr(rng.normal(size=(3, 3)))[0])
+    felt, raw = (Wrench(*rng.normal(size=(3, 3))) for _ in range(2))
+    parts = 0.5, blade, felt, raw, result_of(rng, n), FRAMES["parallel"]
+    recordings = Recording(), Recording()
+    for recording, is_parallel in zip(recordings, (True, False), strict=True):
+        writer = RowWriter(groups, recording, is_parallel)
+        writer.append(FrameData(*parts, (), WallTimes(*range(5)), 0.0))
+    one, other = (recording.rows[:, :-1] for recording in recordings)
+    assert one.shape == (1, len(shared_columns()) - 1) and one.tobytes() == other.tobytes()
