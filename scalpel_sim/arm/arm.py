@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -122,10 +123,9 @@ class DrivenArm:
         """Angles at the last check; NaN: there was none since the arm was put elsewhere."""
         # As bytes the angles are compared in a tenth of a microsecond.
         self._bytes = self._qpos.data.cast("B"), self._angles.data.cast("B")
-        self._take_state = SameTypes(_take_state)
-        self._take_state.call(
-            self._qpos, self._qvel, self._angles.copy(), self._n_warnings, self._dt
-        )
+        take, state = SameTypes(_take_state), (self._qpos, self._qvel, self._n_warnings, self._dt)
+        take.call(*state, self._angles.copy())  # compiled before the first frame
+        self._take_state = partial(take.call, *state, self._angles)
 
     @property
     def time(self) -> float:
@@ -185,9 +185,7 @@ class DrivenArm:
             ArmError: a joint's angle or speed is not finite, it turns by more than
                 `LARGEST_JOINT_STEP` in a step, or MuJoCo has warned.
         """
-        if not self._take_state.call(
-            self._qpos, self._qvel, self._angles, self._n_warnings, self._dt
-        ):
+        if not self._take_state():
             self._refuse_state()
 
     def check_if_set(self) -> None:
@@ -237,16 +235,16 @@ class DrivenArm:
 
 @kernel
 def _take_state(
-    angles: FloatArray, speeds: FloatArray, before: FloatArray, n_warnings: IntArray, dt: float
+    angles: FloatArray, speeds: FloatArray, n_warnings: IntArray, dt: float, before: FloatArray
 ) -> bool:
     """Take the state of a step; return False, and do nothing, where `check` refuses it.
 
     Args:
         angles: Angles of the joints [rad], or how far they slide [m].
         speeds: Their speeds.
-        before: Angles at the last check, which become the present ones.
         n_warnings: How often MuJoCo has warned, by kind.
         dt: Length of the step [s].
+        before: Angles at the last check, which become the present ones.
     """
     # A sum is finite only if all its parts are.
     total_angle, total_speed = 0.0, 0.0

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Literal
 
 import mujoco
@@ -87,15 +88,16 @@ class Blade:
         self._rotation = data.xmat[body_id].reshape(3, 3)
         self._centre_of_mass = data.xipos[body_id]
         self._applied = data.xfrc_applied[body_id]
-        self._edge, self._push = SameTypes(_edge), SameTypes(_push)
+        read, push = SameTypes(_edge), SameTypes(_push)
         # Compiled for floats, and before the first frame.
-        self._edge.call(self._rotation, self._forward, self._tip, self._heel)
-        self._push.call((0.0,) * 9, self._centre_of_mass, np.zeros(6))
+        read.call(self._rotation, self._forward, self._tip, self._heel)
+        push.call(self._centre_of_mass, np.zeros(6), (0.0,) * 9)
+        self._edge = partial(read.call, self._rotation, self._forward, self._tip, self._heel)
+        self._push = partial(push.call, self._centre_of_mass, self._applied)
 
     def segment(self) -> BladeSegment:
         """Return the edge as it is now, in the world frame. Copies."""
-        numbers = self._edge.call(self._rotation, self._forward, self._tip, self._heel)
-        return BladeSegment.of_numbers(numbers)
+        return BladeSegment.of_numbers(self._edge())
 
     def apply(self, wrench: Wrench) -> None:
         """Apply a wrench to the blade until the next call.
@@ -110,7 +112,7 @@ class Blade:
                 `MAX_PLAUSIBLE_TORQUE`.
                 The wrench of the call before stays applied.
         """
-        if self._push.call(wrench.numbers, self._centre_of_mass, self._applied):
+        if self._push(wrench.numbers):
             return
         try:
             self._applied[:] = about_centre_of_mass(wrench, self._centre_of_mass)
@@ -143,13 +145,13 @@ def _edge(rotation: FloatArray, forward: FloatArray, tip: FloatArray, heel: Floa
 
 
 @kernel
-def _push(wrench: _Nine, centre_of_mass: FloatArray, applied: FloatArray) -> bool:
+def _push(centre_of_mass: FloatArray, applied: FloatArray, wrench: _Nine) -> bool:
     """Write `about_centre_of_mass`; return False, and do nothing, where it may be implausible.
 
     Args:
-        wrench: Force [N], torque [N m] and their point [m].
         centre_of_mass: Of the body [m].
         applied: Force and torque on the body.
+        wrench: Force [N], torque [N m] and their point [m].
     """
     fx, fy, fz, tx, ty, tz, x, y, z = wrench
     x, y, z = x - centre_of_mass[0], y - centre_of_mass[1], z - centre_of_mass[2]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Sequence
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -80,24 +81,15 @@ class ArmParts:
         """How far the parts can have moved."""
         self._positions, self._axes = data.geom_xpos, data.geom_xmat
         self._positions_before, self._axes_before = self._positions.copy(), self._axes.copy()
-        self._remain_within = SameTypes(_remain_within)
-
-    def remain_within(self, distance: float) -> bool:
+        where = self.reach.angles, self.reach.start, self.reach.reach
+        now = self._positions, self._axes
+        before = self._positions_before, self._axes_before
+        compiled = SameTypes(_remain_within)
+        compiled.call(*where, *now, *before, -1.0)
+        self.remain_within = partial(compiled.call, *where, *now, *before)
         """Return whether no part can have moved that far since `reach.begin` [m].
 
-        If so, where the parts are now is kept for `before`.
-        """
-        reach = self.reach
-        return self._remain_within.call(
-            distance,
-            reach.angles,
-            reach.start,
-            reach.reach,
-            self._positions,
-            self._axes,
-            self._positions_before,
-            self._axes_before,
-        )
+        If so, where the parts are now is kept for `before`."""
 
     def before(self) -> tuple[FloatArray, FloatArray]:
         """Return positions and axes of the parts when they last remained within. Copies."""
@@ -115,7 +107,6 @@ class ArmParts:
 
 @kernel
 def _remain_within(
-    distance: float,
     angles: FloatArray,
     start: FloatArray,
     reach: FloatArray,
@@ -123,8 +114,9 @@ def _remain_within(
     axes: FloatArray,
     positions_before: FloatArray,
     axes_before: FloatArray,
+    distance: float,
 ) -> bool:
-    """Do `ArmParts.remain_within`: the last two arrays become copies of the two before."""
+    """Do `ArmParts.remain_within`: the last two arrays become copies of the two before them."""
     if not hinge_displacement(angles, start, reach) < distance:
         return False
     for geom in range(len(positions)):

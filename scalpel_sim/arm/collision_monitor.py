@@ -108,7 +108,8 @@ class CollisionMonitor:
         parts, collisions = self._parts, self._collisions
         if parts.remain_within(self._free_way):
             self._has_passed = True
-            self._count(between_arms)
+            if between_arms or self._now:
+                self._count(between_arms)
             return
         if self._has_passed:
             collisions.pass_by(*parts.before())
