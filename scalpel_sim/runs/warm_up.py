@@ -24,6 +24,8 @@ from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, force_parts, frame_row
+from scalpel_sim.recording.recording import Recording
+from scalpel_sim.recording.row_writer import RowWriter
 from scalpel_sim.runs.stop_signals import SignalInterrupt, StopSignals
 from scalpel_sim.scene.read import PARENCHYMA, PHANTOM
 from scalpel_sim.scene.scene import Scene
@@ -244,6 +246,7 @@ def _move(kernels: KernelSet) -> None:
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
     kernels.body(TetrahedralMesh(apart, both)).step(None, _DT)
     compiled_arithmetic()
+    RowWriter(list(COLUMNS.values()), Recording(), is_parallel=True)
     arm = Arm()
     pose = arm.blade.segment()
     stroke = Stroke((0.0, 1.0), (pose, pose))
