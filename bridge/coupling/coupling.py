@@ -100,7 +100,7 @@ class Coupling:
         self.n_implausible = 0
 
     def passes(self, wrench: Six, motion: Six, work: float, silence: float) -> bool:
-        """Do what `felt` does where the arm feels the wrench as it is; else return False.
+        """Act as `felt` where the arm feels the wrench as it is; else return False.
 
         It then has done nothing. So it is in most frames, and takes a third of the time.
 

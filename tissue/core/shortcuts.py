@@ -42,7 +42,7 @@ _NEEDLESS = (
     cast(Any, interpreter).peep_hole_delete_with_exit,
     cast(Any, interpreter).peep_hole_fuse_dict_add_updates,
 )
-"""What Numba looks for in each kernel, and none has: `with`, and dictionaries."""
+"""Features that Numba looks for in each kernel, and none has: `with`, and dictionaries."""
 
 
 @contextmanager
