@@ -160,8 +160,9 @@ class Bridge:
         if frame.is_rotated:
             segment, origin = frame.segment_to_tissue(given), (0.0, 0.0, 0.0)
         if before is None:
-            expect_plane(frame.segment_to_tissue(given), given)
-            before = pose_of(frame.segment_to_tissue(given))
+            first = frame.segment_to_tissue(given)
+            expect_plane(first, given)
+            before = pose_of(first)
         is_plausible, numbers, axes, motion = self._arithmetic.arrival.call(
             segment.numbers, origin, before.tip, before.axes, dt
         )

@@ -119,8 +119,8 @@ class DrivenArm:
         self._qpos, self._qvel = self.data.qpos, self.data.qvel
         self._n_warnings = self.data.warning.number
         self._dt: float = self.model.opt.timestep
-        self._angles = np.full(self.model.nq, math.nan)
-        """Angles at the last check; NaN: there was none since the arm was put elsewhere."""
+        self._angles = np.full(self.model.nq, math.inf)
+        """Angles at the last check; infinite: there was none since the arm was put elsewhere."""
         # As bytes the angles are compared in a tenth of a microsecond.
         self._bytes = self._qpos.data.cast("B"), self._angles.data.cast("B")
         take, state = SameTypes(_take_state), (self._qpos, self._qvel, self._n_warnings, self._dt)
@@ -154,7 +154,7 @@ class DrivenArm:
                 f"{low[i]:.3f} to {high[i]:.3f}"
             )
         mujoco.mj_resetData(self.model, self.data)
-        self._angles[:] = math.nan
+        self._angles[:] = math.inf
         self.data.qpos[:] = np.concatenate([angles, *(other.qpos for other in self.others)])
         mujoco.mj_kinematics(self.model, self.data)
         self.hand.hold(self.blade.segment())
@@ -208,9 +208,10 @@ class DrivenArm:
                 f"at t = {data.time:.4f} s the arm's state is not finite (joints: {names})"
             )
         turned, self._angles[:] = self._qpos - self._angles, self._qpos
-        if np.abs(self._qvel).max() * self._dt > LARGEST_JOINT_STEP:
+        turned[np.isinf(turned)] = 0.0
+        if np.abs(self._qvel).max(initial=0.0) * self._dt > LARGEST_JOINT_STEP:
             self._refuse_motion(self._dt * data.qvel, model.dof_jntid)
-        if np.nanmax(np.abs(turned), initial=0.0) > LARGEST_JOINT_STEP:
+        if np.abs(turned).max(initial=0.0) > LARGEST_JOINT_STEP:
             n_numbers = np.diff(model.jnt_qposadr, append=model.nq)
             self._refuse_motion(turned, np.repeat(np.arange(model.njnt), n_numbers))
         kind = mujoco.mjtWarning(int(np.argmax(self._n_warnings)))
@@ -244,7 +245,7 @@ def _take_state(
         speeds: Their speeds.
         n_warnings: How often MuJoCo has warned, by kind.
         dt: Length of the step [s].
-        before: Angles at the last check, which become the present ones.
+        before: Angles at the last check, or infinity; they become the present ones.
     """
     # A sum is finite only if all its parts are.
     total_angle, total_speed = 0.0, 0.0
@@ -256,7 +257,7 @@ def _take_state(
     for i in range(len(speeds)):
         is_good = is_good and not abs(speeds[i]) * dt > LARGEST_JOINT_STEP
     for i in range(len(angles)):
-        is_good = is_good and not abs(angles[i] - before[i]) > LARGEST_JOINT_STEP
+        is_good = is_good and not LARGEST_JOINT_STEP < abs(angles[i] - before[i]) < math.inf
     for i in range(len(n_warnings)):
         is_good = is_good and n_warnings[i] == 0
     if not is_good:

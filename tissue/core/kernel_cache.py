@@ -20,8 +20,11 @@ from numba.core import caching, compiler
 from numba.core.serialize import dumps
 
 # A kernel contains kernels from other files, so the folder is named after all of them: editing one
-# can never revive an old binary.
+# can never revive an old binary. Kernels of other packages are compiled again by themselves:
+# `_stamp_of`.
 _SOURCES = sorted(Path(__file__).parents[1].rglob("*.py"))
+
+_FILES = frozenset(map(str, _SOURCES))
 
 _DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()[:16]
 
@@ -89,6 +92,30 @@ def _digest_of(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
+@functools.cache
+def _stamp_of(function: Callable[..., Any]) -> str:
+    """Return a digest of what a function is compiled from, besides the sources in `_SOURCES`.
+
+    That is its file, the files of the kernels that it calls, and the constants that these name.
+    """
+    found, left, seen = set[str](), [function], set[Any]()
+    while left:
+        each = left.pop()
+        if each in seen:
+            continue
+        seen.add(each)
+        found.add(_digest_of(each.__code__.co_filename))
+        if each.__code__.co_filename in _FILES:
+            continue
+        for name in each.__code__.co_names:
+            value: Any = each.__globals__.get(name)
+            if hasattr(value, "py_func"):
+                left.append(value.py_func)
+            elif isinstance(value, (int, float, str, tuple)):
+                found.add(f"{name} = {value!r}")
+    return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()
+
+
 class _Results(caching.CacheImpl):
     """Stores results of the compiler, whose libraries know how they are stored."""
 
@@ -144,6 +171,10 @@ class _Files(caching.IndexDataCacheFile):
     Numba keeps an index next to numbered files; two processes that write at once mix them up.
     """
 
+    def __init__(self, path: str, base: str, function: Callable[..., Any]) -> None:
+        super().__init__(path, base, source_stamp=None)
+        self._function = function
+
     def save(self, key: Any, data: Any) -> None:
         """Write the result for a signature."""
         self._save_data(self._name(key), data)
@@ -159,7 +190,8 @@ class _Files(caching.IndexDataCacheFile):
         """Leave the files, which other processes may use."""
 
     def _name(self, key: Any) -> str:
-        described = f"{self._source_stamp} {key}"
+        # Only now: a kernel may call others that its module defines behind it.
+        described = f"{_stamp_of(self._function)} {key}"
         digest = hashlib.sha256(described.encode()).hexdigest()[:16]
         return str(self._data_name_pattern.replace("{number:d}", digest))
 
@@ -170,10 +202,7 @@ class KernelCache(caching.Cache):
     def __init__(self, function: Callable[..., Any], library: Any) -> None:
         self._impl_class: Any = functools.partial(_Results, library=library)
         super().__init__(function)
-        numba_s = self._cache_file
-        self._cache_file = _Files(
-            numba_s._cache_path, self._impl.filename_base, numba_s._source_stamp
-        )
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, function)
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return a result that was written, or None.
@@ -187,7 +216,7 @@ class KernelCache(caching.Cache):
     def _index_key(self, signature: Any, codegen: Any) -> Any:
         """Return what tells results of the function apart, beside its source and the processor.
 
-        They are in the names of the file and of the folder.
+        They are in the names of the file (`_stamp_of`) and of the folder.
         """
         cells = self._py_func.__closure__ or ()
         values = dumps(tuple(cell.cell_contents for cell in cells)) if cells else b""

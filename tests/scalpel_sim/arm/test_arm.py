@@ -105,6 +105,13 @@ def test_a_state_that_is_not_finite_stops_the_run_and_never_resets_silently():
         arm.check()
 
 
+def test_angles_that_are_no_numbers_are_found_before_the_first_check_too():
+    arm = Arm("touch")
+    arm.data.qpos[:] = np.nan
+    with pytest.raises(ArmError, match="state is not finite"):
+        arm.check_if_set()
+
+
 @pytest.mark.parametrize(
     "where, value", [("qvel", 1e3), ("qvel", 1e9), ("qpos", 1e3), ("qpos", -1e9), ("qvel", 501.0)]
 )

@@ -98,6 +98,46 @@ def test_a_second_process_finds_what_the_first_compiled(tmp_path):
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == files
 
 
+CALLED = """
+from tissue.core.jit import kernel
+FACTOR = {factor}
+@kernel
+def scaled(x):
+    return x * {code}
+"""
+
+CALLER = """
+from called import FACTOR, scaled
+from tissue.core.jit import kernel
+@kernel
+def both(x):
+    return later(x) + FACTOR
+@kernel
+def later(x):
+    return scaled(x)
+print(both(1.0))
+"""
+
+
+@pytest.mark.skipif(not is_compiling(), reason="is about what is compiled")
+def test_a_kernel_of_another_package_is_compiled_again_when_what_it_uses_is_edited(tmp_path):
+    (tmp_path / "caller.py").write_text(CALLER)
+    paths = os.pathsep.join([str(PACKAGE.parent), str(tmp_path)])
+    printed = []
+    for factor, code in ((1.0, "2.0"), (1.0, "3.0"), (5.0, "3.0")):
+        (tmp_path / "called.py").write_text(CALLED.format(factor=factor, code=code))
+        found = subprocess.run(
+            [sys.executable, "-B", "caller.py"],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        printed.append(float(found.stdout))
+    assert printed == [3.0, 4.0, 8.0]
+
+
 def test_a_cache_that_cannot_be_written_costs_time_and_nothing_else(tmp_path):
     no_folder = tmp_path / "file"
     no_folder.touch()
