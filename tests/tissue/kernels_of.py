@@ -106,7 +106,7 @@ def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
     `n_nodes`: nodes that there is room for beside the springs.
     """
     solid = no_solid(volume_term(0.0), n_nodes, 0, room_for_stars(n_nodes, 0))
-    frequencies = np.zeros(len(springs.first))
+    frequencies, n_nodes = np.zeros(len(springs.first)), len(springs.first)
     return Elastic(
         springs=springs,
         solid=solid,
@@ -118,6 +118,11 @@ def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
         highest_of_dampers=0.0,
         scaling=no_mass_scaling(),
         frequency_squared=frequencies,
+        n_touching=0,
+        highest_touching=0.0,
+        allowed_touching=0.0,
+        touching=np.zeros(n_nodes, np.int64),
+        of_contact=np.zeros(n_nodes),
     )
 
 

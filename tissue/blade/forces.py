@@ -223,10 +223,16 @@ def limit_frequency_at_blade(
 
 @kernel
 def _limited(elastic: Elastic, body: Body, stiffness: FloatArray, node: int) -> float:
-    """Return the bound on w^2 at a node [1/s2], after it got mass where that is needed."""
+    """Return the bound on w^2 at a node [1/s2], after it got mass where that is needed.
+
+    What contact adds to it takes part in the limit of the body, and not in that at the blade.
+    """
     if body.fixed[node]:
         return 0.0
-    bound = elastic.frequency_squared[node] + stiffness[node, 0] / body.masses[node]
-    allowed = LIMIT_AT_BLADE * elastic.scaling.allowed_between_cuts
+    own, most = elastic.frequency_squared[node], elastic.scaling.allowed_between_cuts
+    bound = own + stiffness[node, 0] / body.masses[node]
+    left = max(most, elastic.allowed_touching) - elastic.of_contact[node]
+    allowed = min(LIMIT_AT_BLADE * most, max(left, own))
     limited: float = limited_frequency(elastic, body, node, bound, allowed)
+    limited += elastic.of_contact[node]
     return limited

@@ -76,6 +76,7 @@ class SelfContact:
         floor: Height of the floor [m], or None.
         frequency_squared: Bound on w^2 of the body before any cut [1/s2].
         acts: Whether there is contact; if not, nothing ever touches.
+        adds_mass: Whether nodes in contact may get mass.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class SelfContact:
         frequency_squared: float,
         *,
         acts: bool = True,
+        adds_mass: bool = False,
     ) -> None:
         n_nodes = len(body.rest)
         added = max(ADDED_SHARE * frequency_squared, LEAST_ADDED)
@@ -132,7 +134,7 @@ class SelfContact:
         )
         """Data of the search; another struct where its arrays grow."""
         time = RETARDATION_TIME / np.sqrt(added)
-        self.limits = new_limits(node_size, added)
+        self.limits = new_limits(node_size, added, adds_mass=adds_mass)
         """Limits of the stiffness and the recovery of contacts."""
         self.forces = new_penalty_forces(n_nodes, friction, time)
         self._search_contacts = SameTypes(search_contacts)

@@ -14,7 +14,11 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
-from tissue.elasticity.frequency.changes import forget_added_mass, return_mass, update_frequencies
+from tissue.elasticity.frequency.changes import (
+    forget_added_mass,
+    return_all_mass,
+    update_frequencies,
+)
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, no_mass_scaling
@@ -95,7 +99,7 @@ class Elasticity:
         if mass_scaling is not None and not material.law.has_springs:
             scaling = self.arrays.scaling
             scaling.allowed = max(mass_scaling**2, self.arrays.highest_of_tetrahedra)
-            scaling.allowed_between_cuts = scaling.allowed
+            scaling.allowed_between_cuts = scaling.allowed_where_strained = scaling.allowed
             scaling.most = LARGEST_ADDED_MASS * float(body.masses[:n_nodes].sum())
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
@@ -109,7 +113,8 @@ class Elasticity:
     def return_mass(self, body: Body) -> None:
         """Take back mass that nodes got between cuts and do not need at rest."""
         if self.arrays.scaling.allowed < math.inf:
-            return_mass(self.arrays, body, self.arrays.solid.every)
+            return_all_mass(self.arrays, body, self.arrays.solid.every)
+            self.arrays.scaling.steps = 0
 
     @property
     def relaxes(self) -> bool:

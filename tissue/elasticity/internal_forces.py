@@ -47,6 +47,16 @@ class Elastic(Arrays, two_precisions=True):
     """Which nodes get mass where tetrahedra carry the shear."""
     frequency_squared: FloatArray = sized("nodes")
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
+    n_touching: IntCell
+    """Number of nodes to whose w^2 contact adds, where tetrahedra resist deformation."""
+    highest_touching: FloatCell
+    """Bound on w^2 of these with their contacts [1/s2]."""
+    allowed_touching: FloatCell
+    """Bound above which they get mass [1/s2]."""
+    touching: IntArray = sized("nodes")
+    """These nodes, shape (nodes,)."""
+    of_contact: FloatArray = sized("nodes")
+    """What contact adds to w^2 of each node [1/s2], shape (nodes,); 0 where nothing touches it."""
 
 
 class Surroundings(Arrays):

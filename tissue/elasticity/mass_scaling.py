@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.core.array_types import IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of, times
-from tissue.core.structs import Arrays, FloatCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.springs import Springs
@@ -43,11 +43,24 @@ class MassScaling(Arrays):
     """The most that they may get [kg]."""
     lost: FloatCell
     """Kinetic energy that nodes lost where their mass changed between two cuts [J]."""
+    is_used_up: IntCell
+    """1 if a node got no mass between two cuts, as the body had all that it may get, else 0."""
+    allowed_where_strained: FloatCell
+    """The same for what strain makes faster: as much as the steps that are taken in any case."""
+    steps: IntCell
+    """Steps that strain may take in an increment, if others do not take more: the limit is that
+    high."""
+    increments: IntCell
+    """Increments since nodes gave back mass."""
+    between_cuts: FloatCell
+    """Mass that nodes got between two cuts since then [kg]."""
 
 
 def no_mass_scaling() -> MassScaling:
     """Return that no node gets mass."""
-    return MassScaling.new({}, allowed=np.inf, allowed_between_cuts=np.inf)
+    return MassScaling.new(
+        {}, allowed=np.inf, allowed_between_cuts=np.inf, allowed_where_strained=np.inf
+    )
 
 
 @kernel
@@ -58,6 +71,7 @@ def scale_masses(
     nodes: IntArray,
     n: int,
     allowed: float,
+    of_contact: FloatArray,
 ) -> float:
     """Give the first `n` of `nodes` the mass with which their bound on w^2 is at most `allowed`.
 
@@ -70,6 +84,7 @@ def scale_masses(
         nodes: The nodes.
         n: How many of them.
         allowed: Bound on w^2 [1/s2].
+        of_contact: What contact adds to w^2 of each node [1/s2]; written.
 
     Returns:
         By how much the added mass has changed [kg].
@@ -91,6 +106,7 @@ def scale_masses(
         solid.frequency_squared[node] = stiffness / after
         solid.shear_frequency_squared[node] *= before / after
         springs.stiffness_per_mass[node] *= before / after
+        of_contact[node] *= before / after
     return change
 
 

@@ -148,7 +148,8 @@ def bound_of_terms(
     Args:
         context: What takes part.
         no_frequency: Zeros, shape (node capacity,).
-        of_contact: What contact and attachments add to w^2 at most [1/s2].
+        of_contact: What attachments add to w^2 at most, and contact where it is not known for each
+            node [1/s2].
         speed: Speed of the fastest node [m/s].
         node_size: Mean node size of the body [m].
         seconds: Time to advance by [s].
@@ -158,7 +159,7 @@ def bound_of_terms(
     added = of_contact
     highest, collapsing = elastic.highest, elastic.collapsing
     find_collapsing(collapsing, body, elastic.frequency_squared, highest, speed, node_size, seconds)
-    least = max(highest, near, collapsing.highest) + added
+    least = max(highest, near, collapsing.highest, elastic.highest_touching) + added
     if stiffens(elastic.solid.law):
         # Tissue that stiffens is stiffest where the blade holds it, and resists together with it.
         added += frequency_with_blade(context.blade, body, no_frequency, external)

@@ -21,24 +21,24 @@ from tissue.blade.blade_context import (
 from tissue.blade.edge import Edge
 from tissue.contact.response.stiffness import Limits
 from tissue.contact.search.search_state import SearchState
-from tissue.contact.search_stages import DONE, added_frequency, wake_contacts
+from tissue.contact.search_stages import DONE, wake_contacts
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.elasticity.relaxed_stress import relaxes
+from tissue.forces.contact_frequencies import frequency_of_contacts
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import end_substep
 from tissue.integrators.damping import damp_if_due, relax_stress
 from tissue.integrators.methods import NYSTROEM, RUNGE_KUTTA
 from tissue.integrators.nystroem import nystroem_step
 from tissue.integrators.runge_kutta import runge_kutta_step
+from tissue.integrators.step_choice import StepChoice, wake
 from tissue.integrators.step_size import (
-    StepChoice,
     begin_increment,
     next_part,
     note_rest,
     room_for_contact,
-    wake,
 )
 from tissue.integrators.verlet import verlet_step
 from tissue.mesh.bounding_boxes import write_bounds
@@ -185,7 +185,7 @@ def _take_contacts(relaxation: Relaxation, part: _Part, held: float) -> int:
         if outcome != DONE:
             choice.room = room_for_contact(choice, step, span)
             return LACKS_CONTACTS + outcome
-    choice.of_contact = added_frequency(search, limits) + held
+    choice.of_contact = held + frequency_of_contacts(step, search, limits)
     relaxation.stage = _FACES
     return RELAXED
 

@@ -22,7 +22,7 @@ from tissue.integrators.methods import Hierarchical, IntegratorOptions, Method
 from tissue.integrators.model import TissueModel
 from tissue.integrators.resting import TIME_TO_REST
 from tissue.integrators.stability import stable_step
-from tissue.integrators.step_size import StepChoice, new_step_choice, wake
+from tissue.integrators.step_choice import StepChoice, new_step_choice, wake
 from tissue.integrators.threads import Threads
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh

@@ -102,6 +102,7 @@ class TissueModel:
             floor,
             self.elasticity.frequency_squared,
             acts=numerics.moves_together,
+            adds_mass=self.elasticity.arrays.scaling.allowed < math.inf and not material.stiffens,
         )
         self.moves_together = numerics.moves_together
         """Whether all nodes are moved together."""

@@ -43,6 +43,9 @@ _INVERSES: Final = tuple((1.0 / STABILITY_LIMIT[:, 1]).tolist())
 """The limit falls nearly as 1 / ratio: a line between its entries would be above it."""
 
 
+_ROUNDING = 1e-9
+"""Share by which a frequency stays below that which would take another step."""
+
 _SURELY_FEW = 0.1
 """Highest frequency and rate of decay times a time step, per step that is allowed, up to which the
 longest step need not be computed. It takes some 1.3 steps at most for each of them, by
@@ -130,6 +133,23 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
     inverse = _INVERSES[i] + share * (_INVERSES[i + 1] - _INVERSES[i])
     limit = 1.0 / inverse
     return limit / frequency
+
+
+@kernel
+def without_another_step(
+    frequency_squared: float, longest: float, span: float
+) -> tuple[int, float]:
+    """Return how many steps a frequency takes, and up to which w^2 [1/s2] it is no more.
+
+    Args:
+        frequency_squared: A bound on w^2 [1/s2].
+        longest: The longest step with it [s].
+        span: Time to advance by [s].
+    """
+    if math.isinf(longest):
+        return 1, math.inf
+    n = max(1, math.ceil(span / longest))
+    return n, (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2
 
 
 @kernel

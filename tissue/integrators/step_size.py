@@ -7,19 +7,15 @@ two steps, and the number of steps is chosen for each part.
 import math
 from typing import Final
 
-import numpy as np
-
-from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
-from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
-from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.neo_hookean import keeps_gradients
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import bound_of_terms, press_at_rest
 from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
+from tissue.integrators.mass_limits import limit_mass, limit_mass_for_strain
 from tissue.integrators.methods import METHODS, OF_LAST_STEP, OF_NEXT_STEP
 from tissue.integrators.node_loops import (
     DISPLACEMENTS,
@@ -38,7 +34,8 @@ from tissue.integrators.resting import (
     mean_speed,
     stop_nodes,
 )
-from tissue.integrators.stability import damping_rate, stable_step
+from tissue.integrators.stability import damping_rate, stable_step, without_another_step
+from tissue.integrators.step_choice import StepChoice
 from tissue.laws.kernels import stiffens
 from tissue.mesh.bounding_boxes import largest_speed
 
@@ -75,110 +72,6 @@ it can be done."""
 _GRADIENTS: Final = tuple(method.gradients for method in METHODS.values())
 _FOLLOWS_SLIVERS: Final = tuple(method.follows_slivers for method in METHODS.values())
 
-_ROUNDING = 1e-9
-"""Share by which a frequency stays below that which would take another step."""
-
-
-class StepChoice(Arrays):
-    """The steps of one increment: what they depend on, and the part that is taken next."""
-
-    method: IntCell
-    """Whose steps they are: its number in `tissue.integrators.methods`."""
-    done: IntCell
-    """Steps of the increment taken so far."""
-    n_steps: IntCell
-    """Steps of the part that is taken next."""
-    refinement: IntCell
-    """How many times as many steps are taken as motion and stability require."""
-    is_at_rest: IntCell
-    """1 while the body is not moved, as it was nearly at rest and nothing touches it, else 0."""
-    is_unstable: IntCell
-    """1 if the motion became unstable: it would take too many steps: see `MOST_STEPS`."""
-    dt: FloatCell
-    """Length of the time step [s]."""
-    begin: FloatCell
-    """Fraction of the time step at which the part begins."""
-    part_seconds: FloatCell
-    """Length of the last part [s]."""
-    part_end: FloatCell
-    """Fraction of the time step at which the part ends."""
-    end: FloatCell
-    """Fraction of the time step at which the increment ends."""
-    span: FloatCell
-    """Length of the increment [s]."""
-    of_contact: FloatCell
-    """What contact adds to w^2 at most [1/s2]; written before an increment begins."""
-    room: FloatCell
-    """What contact may add to w^2 of the body without another step [1/s2]."""
-    least: FloatCell
-    """Bound on w^2 with the body at rest, the blade and contact [1/s2]."""
-    added: FloatCell
-    """What contact adds to w^2, and the blade where tissue stiffens [1/s2]."""
-    needed: FloatCell
-    """Steps that the motion needs in the rest of the increment."""
-    at_rest: FloatCell
-    """Steps that the body at rest would take for it."""
-    strained: FloatCell
-    """The last bound on w^2 of the tetrahedra as they are deformed [1/s2]."""
-    allowed: FloatCell
-    """Up to which w^2 it was not brought near the truth [1/s2]."""
-    moved: FloatCell
-    """How far nodes have moved since, at most [m]."""
-    resting: FloatCell
-    """How long the body has been nearly at rest, and nothing has touched it [s]."""
-    resting_positions: FloatArray
-    """Where the nodes were when that began [m], shape (n_nodes, 3)."""
-    speed: FloatCell
-    """Speed of the fastest node at the begin of the part [m/s]."""
-    node_size: float
-    """Mean node size of the body [m]."""
-    surroundings: Surroundings
-    """Gravity and all damping."""
-    no_frequency: FloatArray
-    """Zeros, shape (node capacity,)."""
-
-
-def new_step_choice(
-    method: int, node_size: float, surroundings: Surroundings, n_nodes: int
-) -> StepChoice:
-    """Return that no increment has begun, with room for that many nodes."""
-    return StepChoice(
-        method=method,
-        done=0,
-        n_steps=0,
-        refinement=1,
-        is_at_rest=0,
-        is_unstable=0,
-        dt=0.0,
-        begin=0.0,
-        part_seconds=0.0,
-        part_end=0.0,
-        end=0.0,
-        span=0.0,
-        of_contact=0.0,
-        room=0.0,
-        least=0.0,
-        added=0.0,
-        needed=0.0,
-        at_rest=0.0,
-        strained=0.0,
-        allowed=0.0,
-        moved=math.inf,
-        resting=0.0,
-        resting_positions=np.zeros((n_nodes, 3)),
-        speed=0.0,
-        node_size=node_size,
-        surroundings=surroundings,
-        no_frequency=np.zeros(n_nodes),
-    )
-
-
-@kernel
-def wake(choice: StepChoice) -> None:
-    """Move the body again, which may have been at rest."""
-    choice.resting = 0.0
-    choice.is_at_rest = 0
-
 
 @kernel
 def room_for_contact(choice: StepChoice, context: StepContext, seconds: float) -> float:
@@ -191,7 +84,7 @@ def room_for_contact(choice: StepChoice, context: StepContext, seconds: float) -
     """
     elastic = context.elastic
     longest = stable_step(choice.method, elastic, elastic.highest, choice.surroundings)
-    room: float = _without_another_step(elastic.highest, longest, seconds)[1] - elastic.highest
+    room: float = without_another_step(elastic.highest, longest, seconds)[1] - elastic.highest
     return room
 
 
@@ -222,10 +115,12 @@ def begin_increment(
         choice.end = begin
         press_at_rest(context, choice.span)
         return
-    _limit_mass(choice, context)
+    limit_mass(choice, context)
+    elastic = context.elastic
     motion = choice.speed, choice.node_size, choice.span
     bounds = bound_of_terms(context, choice.no_frequency, choice.of_contact, *motion)
     choice.least, choice.added = bounds
+    limit_mass_for_strain(choice, elastic)
 
 
 @kernel
@@ -267,7 +162,7 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
     elastic, surroundings = context.elastic, choice.surroundings
     span = choice.dt * (choice.end - choice.begin)
     longest = stable_step(choice.method, elastic, choice.least, surroundings)
-    n, highest = _without_another_step(choice.least, longest, span)
+    n, highest = without_another_step(choice.least, longest, span)
     _note_motion(choice, context)
     step = _strained_step(choice, context, StepLimit(highest - choice.added, choice.added, n))
     choice.needed = max(span / step, choice.speed * span / choice.node_size / LONGEST_MOTION)
@@ -297,33 +192,6 @@ def _note_motion(choice: StepChoice, context: StepContext) -> None:
     """Note how fast the fastest node is, and how far nodes moved in the part before."""
     before, choice.speed = choice.speed, largest_speed(context.body)
     choice.moved += max(before, choice.speed) * choice.part_seconds
-
-
-@kernel
-def _limit_mass(choice: StepChoice, context: StepContext) -> None:
-    """Add no mass to nodes between cuts where one step suffices for the increment without it."""
-    elastic, scaling = context.elastic, context.elastic.scaling
-    at_rest = elastic.highest + choice.of_contact
-    longest = stable_step(choice.method, elastic, at_rest, choice.surroundings)
-    n, highest = _without_another_step(at_rest, longest, choice.span)
-    scaling.allowed_between_cuts = max(scaling.allowed, highest) if n == 1 else scaling.allowed
-
-
-@kernel
-def _without_another_step(
-    frequency_squared: float, longest: float, span: float
-) -> tuple[int, float]:
-    """Return how many steps a frequency takes, and up to which w^2 [1/s2] it is no more.
-
-    Args:
-        frequency_squared: A bound on w^2 [1/s2].
-        longest: The longest step with it [s].
-        span: Time to advance by [s].
-    """
-    if math.isinf(longest):
-        return 1, math.inf
-    n = max(1, math.ceil(span / longest))
-    return n, (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2
 
 
 @kernel

@@ -141,5 +141,5 @@ def test_edges_of_one_piece_are_not_tested_against_each_other():
     """A limit: docs/contact.md names it. Nodes hold the arm here."""
     tissue, _ = fallen(0.012, SolverSettings())
     contact = tissue._model.contact
-    assert contact.forces.n_pressing > 5
+    assert contact.forces.n_contacts > 5
     assert contact.search.edge_pairs.n_pairs == 0

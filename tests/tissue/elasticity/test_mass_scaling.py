@@ -195,10 +195,27 @@ def test_what_is_stretched_everywhere_is_faster():
     assert 0.0 < scaled.cut_report().now.added_mass <= LARGEST_ADDED_MASS
 
 
-def test_tissue_that_stiffens_as_it_is_stretched_gets_no_mass_for_it():
+def test_tissue_that_stiffens_as_it_is_stretched_gets_mass_for_it_too():
+    kind = {"law": "exponential", "stiffening": 1.0}
+    scaled, exact = (pulled_body(least, [node_inside()], **kind) for least in (LEAST, None))
+    scaled._model.elasticity.arrays.scaling.most = np.inf
+    limit = scaled.cut_report().initial.frequency
+    assert strained_bound(scaled) <= limit < 1.1 * limit < strained_bound(exact)
+    assert scaled.cut_report().now.added_mass > LARGEST_ADDED_MASS
+
+
+def test_mass_that_is_used_up_is_given_back_and_used_up_again_soon_takes_another_step():
     tissue = pulled_body(LEAST, [node_inside()], law="exponential", stiffening=1.0)
-    strained_bound(tissue)
-    assert tissue.cut_report().now.added_mass == 0.0
+    scaling = tissue._model.elasticity.arrays.scaling
+    tissue.step(None, strokes.DT)
+    assert scaling.between_cuts > 0.0
+    for steps in (0, 1):
+        scaling.most, scaling.is_used_up = scaling.between_cuts, 1
+        scaling.increments = 10_000 * (1 - steps)
+        assert scaling.steps == 0
+        tissue.step(None, strokes.DT)
+        assert scaling.increments < 2
+    assert scaling.steps > 0
 
 
 def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_back():

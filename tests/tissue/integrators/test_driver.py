@@ -5,6 +5,7 @@ import pytest
 from tests.support import bodies, strokes
 from tests.system.state.test_determinism import fingerprint
 from tissue import BladeShape, Material, SolverSettings, Tissue
+from tissue.forces.contact_frequencies import frequency_of_contacts
 from tissue.integrators.bielser_1998.stepper import relax_in_stages
 from tissue.integrators.step_size import begin_increment, next_part, room_for_contact
 from tissue.mesh.tetrahedron_grid import no_grid
@@ -44,7 +45,8 @@ class InStages:
         room = room_for_contact(choice, system.context, increment.span)
         bounds = elastic.frequency_squared, elastic.highest, room
         contact.prepare(system.body, *bounds, increment.span)
-        choice.of_contact = contact.added_frequency_squared
+        of_contact = system.context, contact.search, contact.limits
+        choice.of_contact = frequency_of_contacts(*of_contact)
         begin_increment(choice, system.context, *increment[1:])
         while next_part(choice, system.context):
             part = increment._replace(begin=choice.begin, end=choice.part_end)

@@ -8,7 +8,8 @@ m_i W_i^2. With
 the contacts together stay below it, K_contact <= diag(m_i W_i^2), however many a node has: the
 inequality of Cauchy and Schwarz with shares |w_ci| / S_i. So the stable step is known before any
 contact is. W_i^2 is what contact adds for every node, and half of what the node itself leaves of
-the frequency that the step is chosen for.
+the frequency that the step is chosen for. Where that would take another step, nodes in contact get
+mass instead (`tissue.forces.contact_frequencies`): few are as fast as the fastest of the body.
 
 Source: Tonge et al. (2012), Mass splitting for jitter-free parallel rigid body simulation, for the
 shares.
@@ -23,7 +24,7 @@ from tissue.contact.response.contacts import (
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays, FloatCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
 from tissue.mesh.body import Body
 
@@ -34,6 +35,15 @@ Larger: stiffer contact; at 1 nothing is left for what strain adds."""
 _LEAST_SHARE = 0.35
 """Least share to which the w^2 that contact adds is lowered where that saves a step. Lower: what
 is pressed against slivers sinks in; 1: a step more in each time step of a body cut often."""
+
+_LEAST_OWN = 0.5
+"""Least w^2 to which nodes in contact are slowed by mass where that saves a step, as a share of the
+highest of the body: they get at most twice their mass. Lower: more mass, in a soft body that
+contact makes much faster."""
+
+_ROOM_FOR_STRAIN = 1.05
+"""Ratio of the w^2 that steps allow to that of such a node with its contacts: as much as counts as
+unstrained (`tissue.elasticity.frequency.quick.UNNOTICED`)."""
 
 _FASTEST_DAMPING = 0.45
 """Highest rate at which contacts together stop a motion, over the highest frequency of the body
@@ -79,10 +89,14 @@ _RECOVERY_FROM_SLACK = 4.0
 class Limits(Arrays):
     """Bounds on the stiffness and the recovery of contacts."""
 
+    is_listed: IntCell
+    """1 from a list of contacts until what they add to w^2 of each node is known, else 0."""
     highest: FloatCell
-    """Bound on w^2 of the whole body that the step is chosen for [1/s2]."""
+    """Bound on w^2 of a node in contact, without it, that the step is chosen for [1/s2]."""
     added: FloatCell
     """Largest part of contact in w^2 of every node [1/s2]."""
+    adds_mass: IntCell
+    """1 where nodes in contact may get mass, else 0."""
     most_added: float
     """Largest part where steps allow [1/s2]."""
     largest_depth: float
@@ -97,16 +111,19 @@ class Limits(Arrays):
     """Distance by which the contacts of a node come out in all between incisions [m]."""
 
 
-def new_limits(node_size: float, added: float) -> Limits:
+def new_limits(node_size: float, added: float, *, adds_mass: bool = False) -> Limits:
     """Return the limits for a body of that mean node size [m].
 
     Args:
         node_size: Mean node size of the body [m].
         added: What contact may add to w^2 of every node [1/s2].
+        adds_mass: Whether nodes in contact may get mass.
     """
     return Limits(
+        is_listed=0,
         highest=0.0,
         added=float(added),
+        adds_mass=int(adds_mass),
         most_added=float(added),
         largest_depth=float(_LARGEST_DEPTH * node_size),
         largest_acceleration=float(_LARGEST_ACCELERATION * node_size * added),
@@ -120,14 +137,29 @@ def new_limits(node_size: float, added: float) -> Limits:
 def limit_stiffness(limits: Limits, highest: float, room: float) -> None:
     """Limit what contact adds to w^2 to what steps allow, or less where that saves a step.
 
+    Where that would be far less, and mass saves the step, it is the nodes that are limited.
+
     Args:
         limits: Written.
         highest: Bound on w^2 of the body without contact [1/s2].
         room: What may be added to that without another step [1/s2].
     """
     most = limits.most_added
-    limits.highest = highest
-    limits.added = min(most, room) if room >= _LEAST_SHARE * most else most
+    limits.highest, limits.added = highest, most
+    if room >= _LEAST_SHARE * most:
+        limits.added = min(most, room)
+    elif limits.adds_mass == 1:
+        own = (highest + room) / _ROOM_FOR_STRAIN - most
+        if own >= _LEAST_OWN * highest:
+            limits.highest = own
+    limits.is_listed = 1
+
+
+@kernel
+def frequency_of_contact(limits: Limits, own: float) -> float:
+    """Return what contact may add to w^2 of a node [1/s2] that has `own` without it [1/s2]."""
+    added: float = limits.added + _ROOM_SHARE * max(limits.highest - own, 0.0)
+    return added
 
 
 @kernel
@@ -156,8 +188,7 @@ def split_masses(
         for q in range(4):
             node, weight = forces.node[c, q], abs(forces.weight[c, q])
             forces.balance.mass[c, q] = body.masses[node]
-            room = max(limits.highest - frequency_squared[node], 0.0)
-            added = limits.added + _ROOM_SHARE * room
+            added = frequency_of_contact(limits, frequency_squared[node])
             squared = max(squared, added)
             softness += weight * share[node] / (body.masses[node] * added)
             mobility += weight * weight / body.masses[node]

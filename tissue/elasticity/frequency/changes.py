@@ -2,8 +2,9 @@
 
 A cut changes the tetrahedra of nodes: those that it makes too fast get mass. What nodes get between
 cuts (`tissue.elasticity.frequency.strained.limited_frequency`) they give back when the blade has
-left an incision. Otherwise each stroke would leave nodes heavier that nothing strains or holds any
-more, until the body has all the mass that it may get and its steps become shorter.
+left an incision, and when they touch nothing any more. Otherwise each stroke would leave nodes
+heavier that nothing strains or holds, until the body has all the mass that it may get and its steps
+become shorter.
 """
 
 import math
@@ -49,7 +50,8 @@ def update_frequencies(
         n = tighten(solid, body, visits, n, elastic.highest_of_tetrahedra)
         changed = solid.listed
         if scaling.allowed < math.inf:
-            scaling.added += scale_masses(body, springs, solid, changed, n, scaling.allowed)
+            limit = scaling.allowed, elastic.of_contact
+            scaling.added += scale_masses(body, springs, solid, changed, n, *limit)
             if scaling.added > scaling.most:
                 _raise_limit(elastic, body)
                 changed, n = solid.every, body.n_nodes
@@ -74,11 +76,25 @@ def _raise_limit(elastic: Elastic, body: Body) -> None:
     springs, every, n = elastic.springs, solid.every, body.n_nodes
     while scaling.added > scaling.most:
         scaling.allowed *= LIMIT_STEP**2
-        scaling.added += scale_masses(body, springs, solid, every, n, scaling.allowed)
+        limit = scaling.allowed, elastic.of_contact
+        scaling.added += scale_masses(body, springs, solid, every, n, *limit)
 
 
 @kernel
-def return_mass(elastic: Elastic, body: Body, every: IntArray) -> None:
+def return_all_mass(elastic: Elastic, body: Body, every: IntArray) -> None:
+    """Take back the mass that nodes do not need at rest, and count anew what they get from now on.
+
+    Args:
+        elastic: The bounds of nodes, and what they have got; written.
+        body: Masses are written.
+        every: The numbers from 0 on, at least as many as there are nodes.
+    """
+    return_mass(elastic, body, every, body.n_nodes)
+    elastic.scaling.increments, elastic.scaling.between_cuts = 0, 0.0
+
+
+@kernel
+def return_mass(elastic: Elastic, body: Body, nodes: IntArray, n: int) -> None:
     """Take back mass that nodes do not need at rest; what it moved with is counted as lost.
 
     Nodes keep their velocities, and with them the momentum of their own mass.
@@ -86,23 +102,25 @@ def return_mass(elastic: Elastic, body: Body, every: IntArray) -> None:
     Args:
         elastic: The bounds of nodes, and what they have got; written.
         body: Masses are written.
-        every: The numbers from 0 on, at least as many as there are nodes.
+        nodes: The nodes.
+        n: How many of them.
     """
-    scaling, n = elastic.scaling, body.n_nodes
-    before = _energy_of_added_mass(body)
-    scaling.added += scale_masses(body, elastic.springs, elastic.solid, every, n, scaling.allowed)
-    scaling.lost += before - _energy_of_added_mass(body)
-    bound_frequencies(body, elastic.springs, every, n)
-    bound_both_frequencies(elastic, every, n)
-    bound_tetrahedra(elastic, body, every, n)
-    forget_tests(elastic.solid, every, n)
+    scaling, springs, solid = elastic.scaling, elastic.springs, elastic.solid
+    before = _energy_of_added_mass(body, nodes, n)
+    limit = scaling.allowed, elastic.of_contact
+    scaling.added += scale_masses(body, springs, solid, nodes, n, *limit)
+    scaling.lost += before - _energy_of_added_mass(body, nodes, n)
+    bound_frequencies(body, springs, nodes, n)
+    bound_both_frequencies(elastic, nodes, n)
+    bound_tetrahedra(elastic, body, nodes, n)
+    forget_tests(solid, nodes, n)
 
 
 @kernel
-def _energy_of_added_mass(body: Body) -> float:
-    """Return the kinetic energy of the mass that was added [J]."""
+def _energy_of_added_mass(body: Body, nodes: IntArray, n: int) -> float:
+    """Return the kinetic energy of the mass that was added to nodes [J]."""
     energy = 0.0
-    for node in range(body.n_nodes):
-        v = vec3(body.velocities, node)
-        energy += 0.5 * body.added_masses[node] * dot(v, v)
+    for i in range(n):
+        v = vec3(body.velocities, nodes[i])
+        energy += 0.5 * body.added_masses[nodes[i]] * dot(v, v)
     return energy

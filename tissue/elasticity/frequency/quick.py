@@ -86,7 +86,7 @@ def quick_bounds(elastic: Elastic, block: int, is_known: bool) -> float:
     law, place = solid.law, width_of(solid.shape) * (1 + block)
     x, y, z = _gradient(solid, block, is_known)
     growth = _growth(solid, block, _cofactors(x, y, z))
-    at_rest = _highest_at_rest(elastic.frequency_squared, solid, block, growth)
+    at_rest = _highest_with_contact(elastic, solid, block, growth)
     bound = growth * at_rest
     further = growth / load_block(solid.tested_growth, place)
     largest_growth = growth
@@ -116,19 +116,33 @@ def _gradient(solid: Solid, block: int, is_known: bool) -> tuple[Vec3, Vec3, Vec
 
 
 @inlined
+def _highest_with_contact(elastic: Elastic, solid: Solid, block: int, a: Lanes) -> Lanes:
+    """Return the highest bound on w^2 at rest, with contact, at the nodes of a block [1/s2]."""
+    own, added = elastic.frequency_squared, elastic.of_contact
+    w0, w1, w2, w3 = _of_corners(own, solid, block, a)
+    c0, c1, c2, c3 = _of_corners(added, solid, block, a)
+    return larger(larger(w0 + c0, w1 + c1), larger(w2 + c2, w3 + c3))
+
+
+@inlined
 def _highest_at_rest(values: FloatArray, solid: Solid, block: int, a: Lanes) -> Lanes:
     """Return the highest bound on w^2 at rest at the nodes of the tetrahedra of a block [1/s2]."""
+    w0, w1, w2, w3 = _of_corners(values, solid, block, a)
+    return larger(larger(w0, w1), larger(w2, w3))
+
+
+@inlined
+def _of_corners(
+    values: FloatArray, solid: Solid, block: int, a: Lanes
+) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return what the corners of the tetrahedra of a block have of `values`."""
     nodes, width = solid.nodes, width_of(solid.shape)
     first = 4 * width * block
-    return larger(
-        larger(
-            gathered_like(a, values, nodes, first),
-            gathered_like(a, values, nodes, first + width),
-        ),
-        larger(
-            gathered_like(a, values, nodes, first + 2 * width),
-            gathered_like(a, values, nodes, first + 3 * width),
-        ),
+    return (
+        gathered_like(a, values, nodes, first),
+        gathered_like(a, values, nodes, first + width),
+        gathered_like(a, values, nodes, first + 2 * width),
+        gathered_like(a, values, nodes, first + 3 * width),
     )
 
 

@@ -212,7 +212,7 @@ def _bound_at_nodes(
 def _strained_bound(
     elastic: Elastic, body: Body, points: FloatArray, visits: Visits, node: int
 ) -> float:
-    """Return the bound on w^2 at a node as its neighbourhood is deformed [1/s2]."""
+    """Return the bound on w^2 at a node in contact, as its neighbourhood is deformed [1/s2]."""
     solid = elastic.solid
     if solid.frequency_test[node] == solid.test:
         known: float = solid.strained_frequency_squared[node]
@@ -230,10 +230,10 @@ def _strained_bound(
     bound = bounds_of_node(solid, body, points, dilatation, visits, node, True).whole
     if elastic.has_springs:
         bound += elastic.springs.frequency_squared[node]
-    if not stiffens(solid.law):
-        bound = limited_frequency(
-            elastic, body, node, bound, elastic.scaling.allowed_between_cuts / FURTHER
-        )
+    of_contact, allowed = elastic.of_contact[node], elastic.scaling.allowed_where_strained
+    if of_contact > 0.0:
+        allowed = max(allowed, elastic.allowed_touching)
+    bound = limited_frequency(elastic, body, node, bound + of_contact, allowed / FURTHER)
     solid.strained_frequency_squared[node] = bound
     solid.frequency_test[node] = solid.test
     return bound
@@ -249,7 +249,8 @@ def bound_tetrahedra(elastic: Elastic, body: Body, nodes: IntArray, n: int) -> N
             t, highest, shear = tetrahedron_of_slot(solid, slot), NO_FREQUENCY, 0.0
             for k in range(4):
                 corner = body.tetrahedra[t, k]
-                highest = max(highest, elastic.frequency_squared[corner])
+                own = elastic.frequency_squared[corner] + elastic.of_contact[corner]
+                highest = max(highest, own)
                 shear = max(shear, solid.shear_frequency_squared[corner])
             solid.inverse_bound[solid.around[slot]] = 1.0 / highest
             solid.shear_share[solid.around[slot]] = shear / highest
@@ -288,9 +289,11 @@ def limited_frequency(
         return bound
     more = mass * (bound / allowed - 1.0)
     if scaling.added + more > scaling.most:
+        scaling.is_used_up = 1
         return bound
     v, share = vec3(body.velocities, node), mass / (mass + more)
     scaling.added += more
+    scaling.between_cuts += more
     scaling.largest = max(scaling.largest, scaling.added)
     scaling.lost += 0.5 * mass * dot(v, v) * (1.0 - share)
     body.masses[node] += more
@@ -298,8 +301,25 @@ def limited_frequency(
     for q in range(3):
         body.velocities[node, q] *= share
     elastic.frequency_squared[node] *= share
+    elastic.of_contact[node] *= share
     solid.frequency_squared[node] *= share
     solid.shear_frequency_squared[node] *= share
     elastic.springs.stiffness_per_mass[node] *= share
     limited: float = bound * share
     return limited
+
+
+@kernel
+def limit_touching(elastic: Elastic, body: Body) -> None:
+    """Give mass to nodes that contact makes faster than the limit, and write what they have then.
+
+    In each increment: the mass that a node got for another reason it may have given back.
+    """
+    highest = 0.0
+    for i in range(elastic.n_touching):
+        node = elastic.touching[i]
+        bound = elastic.frequency_squared[node] + elastic.of_contact[node]
+        highest = max(
+            highest, limited_frequency(elastic, body, node, bound, elastic.allowed_touching)
+        )
+    elastic.highest_touching = highest
