@@ -1,8 +1,12 @@
 from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
-from .core.kernel_cache import cache_directory as cache_directory
-from .core.kernel_cache import n_compiled_kernels as n_compiled_kernels
+from .core.kernel_bundle import LEVELS as LEVELS
+from .core.kernel_bundle import bundle_name as bundle_name
+from .core.kernel_bundle import bundled as bundled
+from .core.kernel_bundle import write_bundle as write_bundle
+from .core.kernel_folder import cache_directory as cache_directory
+from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
 from .io.whole_file import new_whole_file as new_whole_file
@@ -12,10 +16,13 @@ from .mesh.pieces import components as components
 from .state.tissue_state import Around as Around
 
 __all__ = [
+    "LEVELS",
     "Around",
     "Memento",
     "SameTypes",
     "StateRules",
+    "bundle_name",
+    "bundled",
     "cache_directory",
     "components",
     "is_compiling",
@@ -24,4 +31,5 @@ __all__ = [
     "new_whole_file",
     "remove_unfinished",
     "whole_file",
+    "write_bundle",
 ]

@@ -41,7 +41,7 @@ from tissue import (
     block,
     fixed_nodes,
 )
-from tissue.support import cache_directory, is_compiling, n_compiled_kernels
+from tissue.support import LEVELS, bundled, cache_directory, is_compiling, n_compiled_kernels
 
 _SIDE = 0.02
 """Length of the sides of the block that is cut [m]."""
@@ -107,9 +107,24 @@ USUAL_SETS = (KernelSet(), KernelSet(relaxation="verlet", audit=False))
 """Those of the default scene, as `run` and as `view` do it."""
 
 
-def kernels_are_compiled(kernels: KernelSet) -> bool:
-    """Return whether the cache has all kernels of a set, compiled from exactly these sources."""
-    return _mark(kernels).exists() or _mark(kernels._replace(has_table=True)).exists()
+def folder_of(level: str | None = None) -> Path:
+    """Return the folder of kernels for a level of processors [default: for this one]."""
+    return cache_directory() if level is None else LEVELS[level].folder
+
+
+def kernels_are_compiled(kernels: KernelSet, level: str | None = None) -> bool:
+    """Return whether there are all kernels of a set, compiled from exactly these sources.
+
+    Args:
+        kernels: The set.
+        level: Level of processors whose folder to look in [default: the bundle that this process
+            uses, and the folder of this processor].
+    """
+    folder = folder_of(level)
+    for mark in (_mark(kernels), _mark(kernels._replace(has_table=True))):
+        if (folder / mark).exists() or (level is None and bundled(mark) is not None):
+            return True
+    return False
 
 
 def prepare_kernels(
@@ -122,14 +137,24 @@ def prepare_kernels(
         _move(kernels)
 
 
-def compile_ahead(sets: Sequence[KernelSet], on_progress: Progress = lambda n, n_all: None) -> None:
+def compile_ahead(
+    sets: Sequence[KernelSet],
+    on_progress: Progress = lambda n, n_all: None,
+    level: str | None = None,
+) -> None:
     """Compile the kernels of some sets by all cores, where the cache does not have them.
 
     Two processes compile the first set, and with it most of what the others share; then as many as
     there are cores compile the others, each a share of them. The cache passes on the binaries. What
     they do not compile is compiled where it is used.
+
+    Args:
+        sets: The sets.
+        on_progress: Called from time to time.
+        level: Level of processors for which to compile [default: for this one].
     """
-    missing = [kernels for kernels in sets if not kernels_are_compiled(kernels)]
+    folder = folder_of(level)
+    missing = [kernels for kernels in sets if not kernels_are_compiled(kernels, level)]
     if not (missing and is_compiling()):
         return
     first, others, n_cores = missing[:1], missing[1:], os.cpu_count() or 1
@@ -137,29 +162,31 @@ def compile_ahead(sets: Sequence[KernelSet], on_progress: Progress = lambda n, n
     are_done = True
     with StopSignals() as stop:
         for tasks in ([(job, first) for job in _JOBS], [(_EVERY_JOB, share) for share in shares]):
-            with _processes(tasks) as processes:
+            with _processes(tasks, level) as processes:
                 while any(process.poll() is None for process in processes):
                     if stop.reason is not None:
                         raise SignalInterrupt(stop.reason)
-                    found = n_compiled_kernels()
+                    found = n_compiled_kernels(folder)
                     on_progress(found, max(found, USUAL_NUMBER))
                     time.sleep(_SECONDS_PER_CHECK)
                 are_done &= not any(process.returncode for process in processes)
     if are_done:
-        found = n_compiled_kernels()
+        found = n_compiled_kernels(folder)
         on_progress(found, found)
         for kernels in missing:
-            _note(kernels)
+            _note(folder / _mark(kernels))
 
 
 @contextmanager
 def _processes(
-    tasks: Sequence[tuple[str, Sequence[KernelSet]]],
+    tasks: Sequence[tuple[str, Sequence[KernelSet]]], level: str | None
 ) -> Iterator[list["subprocess.Popen[bytes]"]]:
     """Start a process for each job and its sets, and end them where this one is interrupted."""
+    environment = os.environ | (LEVELS[level].environment if level else {})
     started = [
         subprocess.Popen(
             [sys.executable, "-m", "scalpel_sim.runs.warm_up", job, *map(json.dumps, sets)],
+            env=environment,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
@@ -173,15 +200,15 @@ def _processes(
             process.wait()
 
 
-def _mark(kernels: KernelSet) -> Path:
-    """Return the file that says that a set is complete."""
-    return cache_directory() / ("-".join(map(str, kernels)) + ".complete")
+def _mark(kernels: KernelSet) -> str:
+    """Return the name of the file that says that a set is complete."""
+    return "-".join(map(str, kernels)) + ".complete"
 
 
-def _note(kernels: KernelSet) -> None:
+def _note(mark: Path) -> None:
     """Note that a set is complete. Where nothing can be written, nothing was."""
     try:
-        _mark(kernels).touch()
+        mark.touch()
     except OSError:
         return
 

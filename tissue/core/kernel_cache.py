@@ -1,64 +1,24 @@
-"""The folder of compiled kernels, in a form that can be copied to another machine.
+"""Compiled kernels as files that can be copied to another machine, or packed in a bundle.
 
-There is one folder for each state of the sources, compiler and processor. Numba finds a cached
-function by the path of its source file. Here it is the name of its module, in `cache_directory`: a
-copy serves an installation at any other path.
+Numba finds a cached function by the path of its source file. Here it is the name of its module, in
+`cache_directory`: a copy serves an installation at any other path.
 """
 
 import functools
 import hashlib
 import logging
-import os
+import pickle
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import llvmlite.binding as llvm
-import numba as nb
-import platformdirs
 from numba.core import caching, compiler
 from numba.core.serialize import dumps
 
-# A kernel contains kernels from other files, so the folder is named after all of them: editing one
-# can never revive an old binary. Kernels of other packages are compiled again by themselves:
-# `_stamp_of`.
-_SOURCES = sorted(Path(__file__).parents[1].rglob("*.py"))
-
-_FILES = frozenset(map(str, _SOURCES))
-
-_DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()[:16]
+from tissue.core.kernel_bundle import bundled
+from tissue.core.kernel_folder import FILES, cache_directory
 
 _log = logging.getLogger(__name__)
-
-
-def cache_root() -> Path:
-    """Return the folder that holds all caches: $NUMBA_CACHE_DIR, else the user's cache folder."""
-    return Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("scalpel-sim"))
-
-
-def cache_directory() -> Path:
-    """Return where kernels of exactly these sources are kept for exactly this processor."""
-    return cache_root() / "kernels" / f"{_DIGEST}-{_machine()}"
-
-
-def n_compiled_kernels() -> int:
-    """Return how many kernels are in `cache_directory`, compiled by any process."""
-    return sum(1 for _ in cache_directory().glob("*/*-part.*.nbc"))
-
-
-@functools.cache
-def _machine() -> str:
-    """Return a digest of the version of Numba and the processor that it compiles for.
-
-    In a folder that is found by it all files fit. One image can hold those of several processors.
-    """
-    config = cast(Any, nb.config)
-    processor = config.CPU_NAME or llvm.get_host_cpu_name()
-    features = config.CPU_FEATURES
-    if features is None:
-        features = llvm.get_host_cpu_features().flatten()
-    described = f"{nb.__version__} {llvm.get_process_triple()} {processor} {features}"
-    return hashlib.sha256(described.encode()).hexdigest()[:8]
 
 
 class _Locator(caching._CacheLocator):
@@ -94,7 +54,7 @@ def _digest_of(file: str) -> str:
 
 @functools.cache
 def _stamp_of(function: Callable[..., Any]) -> str:
-    """Return a digest of what a function is compiled from, besides the sources in `_SOURCES`.
+    """Return a digest of what a function is compiled from, besides the sources of this package.
 
     That is its file, the files of the kernels that it calls, and the constants that these name.
     """
@@ -105,7 +65,7 @@ def _stamp_of(function: Callable[..., Any]) -> str:
             continue
         seen.add(each)
         found.add(_digest_of(each.__code__.co_filename))
-        if each.__code__.co_filename in _FILES:
+        if each.__code__.co_filename in FILES:
             continue
         for name in each.__code__.co_names:
             value: Any = each.__globals__.get(name)
@@ -180,9 +140,13 @@ class _Files(caching.IndexDataCacheFile):
         self._save_data(self._name(key), data)
 
     def load(self, key: Any) -> Any:
-        """Return the result for a signature; None where there is none."""
+        """Return the result for a signature, from the bundle first; None where there is none."""
+        name = self._name(key)
+        packed = bundled(f"{Path(self._cache_path).name}/{name}")
+        if packed is not None:
+            return pickle.loads(packed)
         try:
-            return self._load_data(self._name(key))
+            return self._load_data(name)
         except OSError:
             return None
 

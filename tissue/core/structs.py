@@ -107,7 +107,7 @@ class Arrays:
         TypeError: fields are missing or unknown, or an array is not C-contiguous.
     """
 
-    _numba_type_: ArraysType | None = None
+    _numba_type_: ArraysType
     _types: ClassVar[dict[Any, ArraysType]] = {}
     _most_types: ClassVar[int] = 1
     _cells: ClassVar[tuple[str, ...]] = ()
@@ -148,7 +148,7 @@ class Arrays:
             setattr(self, name, value)
             if isinstance(value, Arrays):
                 words.append(value.address)
-                kinds.append((name, typeof_impl(value, None)))
+                kinds.append((name, value._numba_type_))
             elif isinstance(value, float):
                 words.append(_word(value))
                 kinds.append((name, types.float64))
@@ -278,7 +278,7 @@ class Vectors(Arrays):
 
 
 @typeof_impl.register(Arrays)
-def _typeof(value: Arrays, _: Any) -> ArraysType | None:
+def _typeof(value: Arrays, _: Any) -> ArraysType:
     return value._numba_type_
 
 

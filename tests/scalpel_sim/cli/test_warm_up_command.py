@@ -2,14 +2,18 @@
 
 import io
 import json
+import os
+import platform
+import subprocess
 
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.errors import EXIT_OK
+from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
 from scalpel_sim.runs import console
 from scalpel_sim.runs.options import PrintOptions
-from tissue.support import cache_directory, n_compiled_kernels
+from tests.support.processes import PROGRAM, environment
+from tissue.support import LEVELS, cache_directory, n_compiled_kernels
 
 
 def test_it_prints_the_folder_that_holds_the_kernels(capsys):
@@ -19,6 +23,40 @@ def test_it_prints_the_folder_that_holds_the_kernels(capsys):
     assert printed["folder"].startswith(printed["root"])
     assert printed["kernels"] == n_compiled_kernels() > 100
     assert printed["bytes"] > 1e6
+
+
+def test_a_level_that_this_machine_does_not_reach_is_refused(capsys):
+    """Kernels are compiled as they run, so not for an architecture that runs none of them here."""
+    other = "x86-64-v3" if platform.machine() in ("aarch64", "arm64") else "neoverse"
+    assert command_line(["warm-up", "--target", other]) == EXIT_WRONG_USE
+    assert f"cannot compile for {other} here" in capsys.readouterr().err
+
+
+def test_a_file_for_a_bundle_needs_its_level(capsys):
+    assert command_line(["warm-up", "--out", "kernels.zip"]) == EXIT_WRONG_USE
+    assert "--target" in capsys.readouterr().err
+
+
+@pytest.mark.end_to_end
+@pytest.mark.skipif(all(level.missing() for level in LEVELS.values()), reason="of no level")
+def test_a_bundle_of_a_level_serves_a_run_in_a_fresh_home(tmp_path):
+    level = next(name for name, level in LEVELS.items() if not level.missing())
+    file = tmp_path / "kernels.zip"
+    command = [*PROGRAM, "warm-up", "grid2", "--target", level, "--out", file, "--json"]
+    made = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
+    assert json.loads(made.stdout)["programs"] > 50
+    assert "compiling kernels" in made.stderr
+    fresh = {"HOME": str(tmp_path / "home"), "SCALPEL_SIM_BUNDLE": str(file)}
+    variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    ran = subprocess.run(
+        [*PROGRAM, "run", "grid2", "--seconds", "0.1", "--out", tmp_path / "out"],
+        env=variables | {"PYTHONPATH": environment()["PYTHONPATH"]} | fresh,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert not ran.stderr
+    assert not list((tmp_path / "home").rglob("*.nbc"))
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from tests.support.processes import environment
 from tissue import block
-from tissue.support import cache_directory
+from tissue.support import LEVELS, cache_directory, write_bundle
 
 SMALL = KernelSet.of(SCENES["grid2"])
 """A set whose blade is a line."""
@@ -145,3 +145,22 @@ def test_a_copied_cache_serves_a_copied_program_without_compiling(tmp_path):
     place, names = done.stdout.splitlines()
     assert Path(place).is_relative_to(tmp_path)
     assert names == "[]"
+
+
+@pytest.mark.skipif(all(level.missing() for level in LEVELS.values()), reason="of no level")
+def test_with_a_bundle_a_first_run_compiles_and_writes_no_kernel(tmp_path):
+    """Whatever package the kernels are in."""
+    compile_ahead([SMALL])
+    level = next(name for name, level in LEVELS.items() if not level.missing())
+    bundle = tmp_path / "kernels.zip"
+    assert write_bundle(level, cache_directory(), bundle) > 50
+    variables = {"SCALPEL_SIM_BUNDLE": str(bundle), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", RUN_AND_COUNT],
+        env=environment() | variables,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert not list(tmp_path.glob("cache/**/*.nbc"))
