@@ -50,7 +50,19 @@ _DT = 1e-3
 _SECONDS_PER_CHECK = 0.1
 """Time between two checks of the progress of the processes [s]."""
 USUAL_NUMBER = 1000
-"""How many kernels a set has, about: the end of the progress bar, unless there are more."""
+"""How many kernels a set has, about."""
+_ADDED = {
+    "law": 70,
+    "scheme": 60,
+    "relaxation": 60,
+    "audit": 20,
+    "has_sides": 40,
+    "precision": 500,
+    "relaxes": 20,
+    "is_held": 40,
+    "has_table": 60,
+}
+"""How many kernels a set has, about, that one does not which differs in one field."""
 
 Progress = Callable[[int, int], None]
 """Receives how many kernels are compiled, and how many there will be, about."""
@@ -159,6 +171,7 @@ def compile_ahead(
         return
     first, others, n_cores = missing[:1], missing[1:], os.cpu_count() or 1
     shares = [share for i in range(n_cores) if (share := others[i::n_cores])]
+    n_before, n_new = _expected(missing, folder)
     are_done = True
     with StopSignals() as stop:
         for tasks in ([(job, first) for job in _JOBS], [(_EVERY_JOB, share) for share in shares]):
@@ -166,15 +179,37 @@ def compile_ahead(
                 while any(process.poll() is None for process in processes):
                     if stop.reason is not None:
                         raise SignalInterrupt(stop.reason)
-                    found = n_compiled_kernels(folder)
-                    on_progress(found, max(found, USUAL_NUMBER))
+                    n = n_compiled_kernels(folder) - n_before
+                    on_progress(n, max(n, n_new))
                     time.sleep(_SECONDS_PER_CHECK)
                 are_done &= not any(process.returncode for process in processes)
     if are_done:
-        found = n_compiled_kernels(folder)
-        on_progress(found, found)
+        n = n_compiled_kernels(folder) - n_before
+        on_progress(n, n)
         for kernels in missing:
             _note(folder / _mark(kernels))
+
+
+def _expected(missing: Sequence[KernelSet], folder: Path) -> tuple[int, int]:
+    """Return how many kernels of a folder are not counted, and how many will be beside those.
+
+    Where no set is complete, those of a first run that was interrupted count, too.
+    """
+    there = [tuple(mark.stem.split("-")) for mark in folder.glob("*.complete")]
+    n_before, n_new = n_compiled_kernels(folder) if there else 0, 0
+    for kernels in missing:
+        texts = tuple(map(str, kernels))
+        added = [
+            sum(
+                _ADDED[name]
+                for name, one, other in zip(KernelSet._fields, texts, each, strict=True)
+                if one != other
+            )
+            for each in there
+        ]
+        n_new += min(added, default=USUAL_NUMBER)
+        there.append(texts)
+    return n_before, n_new
 
 
 @contextmanager
