@@ -114,15 +114,15 @@ def test_sets_are_compiled_one_first_and_the_others_in_shares_by_all_cores(start
 
 def test_the_progress_counts_what_is_added_to_the_kernels_of_other_sets(tmp_path, monkeypatch):
     """Beside the kernels of the organ it would else be at its end from its begin."""
-    default, silent = KernelSet(), KernelSet(audit=False)
+    default, held = KernelSet(), KernelSet(is_held=True)
     monkeypatch.setattr(warm_up, "n_compiled_kernels", lambda folder: 1003)
     assert warm_up._expected([default], tmp_path) == (0, warm_up.USUAL_NUMBER)
     (tmp_path / warm_up._mark(default)).touch()
-    assert warm_up._expected([silent], tmp_path) == (1003, warm_up._ADDED["audit"])
-    other, again = silent._replace(relaxes=True), default._replace(relaxes=True)
-    added = warm_up._ADDED["audit"] + 2 * warm_up._ADDED["relaxes"]
-    assert warm_up._expected([silent, other], tmp_path)[1] == added - warm_up._ADDED["relaxes"]
-    assert warm_up._expected([silent, other, again], tmp_path)[1] == added
+    n_held, n_relaxing = warm_up._ADDED["is_held"], warm_up._ADDED["relaxes"]
+    assert warm_up._expected([held], tmp_path) == (1003, n_held)
+    both, other = held._replace(relaxes=True), default._replace(relaxes=True)
+    assert warm_up._expected([held, both], tmp_path)[1] == n_held + n_relaxing
+    assert warm_up._expected([held, both, other], tmp_path)[1] == n_held + 2 * n_relaxing
 
 
 def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started):
