@@ -30,6 +30,7 @@ HELPS = (
     "materials",
     "figure",
     "new",
+    "warm-up",
     "validate",
     "bench peers",
     "bench real-time",

@@ -77,7 +77,7 @@ def started(monkeypatch):
             processes.append(self)
 
     monkeypatch.setattr(subprocess, "Popen", RecordedProcess)
-    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda kernels: False)
+    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda *_: False)
     return processes
 
 
@@ -120,9 +120,10 @@ def test_the_progress_counts_what_is_added_to_the_kernels_of_other_sets(tmp_path
     (tmp_path / warm_up._mark(default)).touch()
     n_held, n_relaxing = warm_up._ADDED["is_held"], warm_up._ADDED["relaxes"]
     assert warm_up._expected([held], tmp_path) == (1003, n_held)
+    assert warm_up._expected([default._replace(has_table=False)], tmp_path) == (1003, 0)
     both, other = held._replace(relaxes=True), default._replace(relaxes=True)
     assert warm_up._expected([held, both], tmp_path)[1] == n_held + n_relaxing
-    assert warm_up._expected([held, both, other], tmp_path)[1] == n_held + 2 * n_relaxing
+    assert warm_up._expected([held, both, other], tmp_path)[1] == n_held + n_relaxing
 
 
 def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started):
@@ -135,7 +136,7 @@ def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started):
 
 
 def test_a_later_run_starts_none(started, monkeypatch):
-    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda kernels: True)
+    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda *_: True)
     compile_ahead([SMALL])
     assert not started
 
