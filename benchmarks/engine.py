@@ -22,7 +22,7 @@ from tissue.core.jit import kernel
 from tissue.forces.step_context import Increment
 from tissue.forces.terms import accelerations
 from tissue.integrators.global_stepper import GlobalStepper
-from tissue.integrators.methods import Global, method_of
+from tissue.integrators.methods import Global, Verlet, method_of
 from tissue.laws.energy_density import neo_hookean
 from tissue.mesh.body import Body
 
@@ -134,6 +134,8 @@ class EngineLoops:
         is_averaged: Whether dilatation is averaged over nodes, as the engine does, or taken in
             each tetrahedron, as other engines do.
         precision: Of the forces of tetrahedra, `double` or `single`.
+        has_drag: Whether the default drag slows the motion within the tissue.
+        dt: Time step [s].
     """
 
     def __init__(
@@ -144,9 +146,15 @@ class EngineLoops:
         is_damped: bool = True,
         is_averaged: bool = True,
         precision: str = "double",
+        has_drag: bool = True,
+        dt: float = FRAME_DT,
     ) -> None:
         material = block_material(law, is_damped=is_damped)
+        if not has_drag:
+            material = replace(material, viscous_damping=0.0)
+        self._dt = dt
         self._stepper = GlobalStepper(method_of(Global(damping="step"), material.law))
+        self._verlet = GlobalStepper(method_of(Verlet(), material.law))
         solver = SolverSettings(relaxation=Global(damping="step"), precision=precision)
         self._tissue = Tissue(mesh, material, fixed=held_nodes(mesh), solver=solver)
         if not is_averaged:
@@ -172,17 +180,24 @@ class EngineLoops:
         body = self._tissue._body
         for _ in range(n):
             self.forces(1)
-            _kick_and_drift(body, self._tissue._model.stages.a1, FRAME_DT)
+            _kick_and_drift(body, self._tissue._model.stages.a1, self._dt)
 
     def runge_kutta_steps(self, n: int) -> None:
         """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
-        increment = Increment(NOWHERE, n * FRAME_DT, 0.0, 1.0)
-        self._stepper.take_steps(self._tissue._model, increment, n)
+        self._take(self._stepper, n)
+
+    def verlet_steps(self, n: int) -> None:
+        """Take steps of position Verlet: one evaluation of the forces each."""
+        self._take(self._verlet, n)
+
+    def _take(self, stepper: GlobalStepper, n: int) -> None:
+        increment = Increment(NOWHERE, n * self._dt, 0.0, 1.0)
+        stepper.take_steps(self._tissue._model, increment, n)
 
     def frames(self, n: int) -> None:
         """Advance the body by whole frames, without a blade."""
         for _ in range(n):
-            self._tissue.step(None, FRAME_DT)
+            self._tissue.step(None, self._dt)
 
     @property
     def springs(self) -> tuple[IntArray, FloatArray]:

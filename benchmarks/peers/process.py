@@ -1,6 +1,6 @@
 """One case of one engine in a process of its own, which steps on request; the body that it gets.
 
-`benchmarks.peers.adapters` is the other side.
+`benchmarks.peers.serving` is the other side.
 """
 
 import json
@@ -22,20 +22,23 @@ from benchmarks.engine import (
     block_material,
     held_nodes,
 )
-from benchmarks.peers.adapters import PeerBody, write_body
+from benchmarks.peers.serving import PeerBody, write_body
 from scalpel_sim.recording.recording import unnamed_file
 from tissue import FloatArray, TetrahedralMesh
 
-_ADAPTERS = Path(__file__).with_name("adapters.py")
-"""File of the adapters. It is run by path, since the other Python need not have this package."""
+_ROOT = Path(__file__).parents[2]
+"""Where the other Python, which need not have this package, finds the adapters."""
 
 LONGEST_START = 300.0
-"""Longest time for an engine to import, compile and build its body [s]; Warp compiles for a
-minute."""
+"""Longest time for an engine to import, compile, build its body and do the first swing [s]; Warp
+compiles for a minute."""
 LONGEST_TURN = 120.0
 """Longest time for a turn [s]: the slowest engine takes some tenths of a second a step."""
 LONGEST_END = 10.0
 """Longest time to end without being killed [s]."""
+
+_GRAVITY = 9.81
+"""Gravity [m/s2], that of a `Tissue`."""
 
 _ONE_THREAD = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS")
@@ -66,6 +69,7 @@ class PeerProcess:
     Args:
         adapter: Name of the adapter.
         case: The case, as the adapter names it.
+        dt: Time step [s].
         body: File with the arrays of `PeerBody`.
         python: The Python that has the engine.
         core: Index of the core to run on.
@@ -75,10 +79,13 @@ class PeerProcess:
         PeerError: the engine cannot make this body, or takes too long.
     """
 
-    def __init__(self, adapter: str, case: str, body: Path, python: Path, core: int) -> None:
+    def __init__(
+        self, adapter: str, case: str, dt: float, body: Path, python: Path, core: int
+    ) -> None:
         self._errors = unnamed_file()
         self._process = subprocess.Popen(
-            [python, _ADAPTERS, adapter, body, case, str(core)],
+            [python, "-m", "benchmarks.peers.adapters", adapter, body, case, str(dt), str(core)],
+            cwd=_ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -86,10 +93,13 @@ class PeerProcess:
             env=_environment(python),
         )
         try:
-            self.version: str = self._answer(LONGEST_START)["version"]
+            begin = self._answer(LONGEST_START)
         except BaseException:
             self.close()
             raise
+        self.version: str = begin["version"]
+        self.sag = np.array(begin["sag"])
+        """Mean sag of the nodes at each instant of the first swing [m]."""
 
     def turn(self, seconds: float) -> PeerTurn:
         """Run one turn of at least this long [s].
@@ -145,13 +155,14 @@ class PeerProcess:
 
 
 def start_peer(
-    adapter: str, case: str, body: Path, pythons: Sequence[Path], core: int
+    adapter: str, case: str, dt: float, body: Path, pythons: Sequence[Path], core: int
 ) -> PeerProcess:
     """Start a case in the first of these Pythons that has its engine.
 
     Args:
         adapter: Name of the adapter.
         case: The case, as the adapter names it.
+        dt: Time step [s].
         body: File with the arrays of `PeerBody`.
         pythons: Where to look for the engine, in this order.
         core: Index of the core to run on.
@@ -162,10 +173,10 @@ def start_peer(
     """
     for python in pythons[:-1]:
         try:
-            return PeerProcess(adapter, case, body, python, core)
+            return PeerProcess(adapter, case, dt, body, python, core)
         except NotInstalledError:
             continue
-    return PeerProcess(adapter, case, body, pythons[-1], core)
+    return PeerProcess(adapter, case, dt, body, pythons[-1], core)
 
 
 def last_core() -> int:
@@ -198,6 +209,7 @@ def body_file(folder: Path, mesh: TetrahedralMesh) -> Path:
         young_modulus=YOUNG_MODULUS,
         poisson_ratio=POISSON_RATIO["neo_hookean"],
         retardation_time=block_material("springs").retardation_time,
+        gravity=_GRAVITY,
         dt=FRAME_DT,
     )
     write_body(str(file), body)
