@@ -66,7 +66,7 @@ TIMED_PARTS = (
     "tissue.stepping.stages:StepStages._detect",
     "tissue.cutting.incision:Incision.detect",
     "tissue.stepping.stages:StepStages._result",
-    "tissue.stepping.energy_audit:Audit.energies",
+    "tissue.stepping.energy_audit:Audit.update",
 )
 """Modules, and functions or methods in them."""
 

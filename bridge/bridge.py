@@ -369,11 +369,11 @@ class Bridge:
         Raises:
             CouplingError: a node is not finite.
         """
-        low, high = result.bounds.tolist()
-        (ax, ay, az), (bx, by, bz) = low, high
+        box = result.box
+        (ax, ay, az), (bx, by, bz) = box
         if not math.isfinite(ax + ay + az + bx + by + bz):
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
-        self._broad_phase.update_bounds((low, high), seconds)
+        self._broad_phase.update_bounds(box, seconds)
         before = 0.0 if self.result is None else self.result.anchored_length
         self._is_anchored_as_before = 0.0 < result.anchored_length == before
         self.result = result

@@ -14,6 +14,9 @@ from tissue.core.three_vectors import Wrench
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and only `Surface.to_trimesh` needs it
     from trimesh import Trimesh
 
+BoxNumbers = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Lowest and highest corner of a box [m], in plain numbers."""
+
 SurfaceQuantity = Literal["displacement", "strain", "stress"]
 """What a picture can show of the deformation: see `Tissue.surface_values`."""
 
@@ -101,7 +104,12 @@ class Energies(NamedTuple):
     @property
     def residual(self) -> float:
         """Work done on the tissue less all other terms [J]: the error of time integration."""
-        return sum(self[:N_WORKS]) - sum(self[N_WORKS:])
+        done, spent = 0.0, 0.0
+        for work in self[:N_WORKS]:
+            done += work
+        for energy in self[N_WORKS:]:  # one after the other, as kernels add them
+            spent += energy
+        return done - spent
 
 
 class StageTimes(NamedTuple):
@@ -181,6 +189,18 @@ class StepResult(NamedTuple):
     def contacts_of_blade(self) -> RigidContacts:
         """Where the blade acts on the tissue: without contacts of geoms, which take time."""
         return self.contacts.of_blade
+
+    @property
+    def box(self) -> BoxNumbers:
+        """`bounds` in plain numbers."""
+        low, high = self.bounds.tolist()
+        return low, high
+
+    @property
+    def account(self) -> FloatArray | None:
+        """The numbers of `energies`, and their residual [J]; None without an audit."""
+        energies = self.energies
+        return None if energies is None else np.array((*energies, energies.residual))
 
 
 class TetrahedralMesh(NamedTuple):

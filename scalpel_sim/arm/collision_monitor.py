@@ -83,7 +83,9 @@ class CollisionMonitor:
         self._collisions = Collisions(self._parts.parts, [*planes, *fixtures])
         self._data = arm.data
         self._arm_of = arms_of_geoms(model, bodies.values())
-        self._has_two = len(set(self._arm_of.tolist()) - {WORLD}) > 1
+        # The hand that leads the blade touches nothing, unless the model names it in a pair.
+        touches = (model.geom_contype | model.geom_conaffinity | model.npair) != 0
+        self._has_two = len(set(self._arm_of[touches].tolist()) - {WORLD}) > 1
         self._free_way = 0.0
         self._has_passed = False
         self._now: tuple[tuple[str, str], ...] = ()

@@ -1,31 +1,53 @@
-"""Writes the rows of a recording: the columns of the blade by one call of a kernel."""
+"""Writes the rows of a recording: the columns that all runs have by one call of a kernel."""
 
+import math
 from collections.abc import Sequence
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.recording.columns import COLUMNS, ColumnGroup, FrameData, add_up, frame_row
+from scalpel_sim.recording.columns import (
+    ACCOUNT,
+    COLUMNS,
+    ColumnGroup,
+    FrameData,
+    add_up,
+    frame_row,
+)
 from scalpel_sim.recording.recording import Recording
 from tissue import FloatArray
 from tissue.support import SameTypes, kernel
 
 _Nine = tuple[float, float, float, float, float, float, float, float, float]
-_Five = tuple[float, float, float, float, float]
+_Six = tuple[float, float, float, float, float, float]
 
-_OF_BLADE = tuple(COLUMNS[name] for name in ("motion", "force_parts", "cut"))
+_SHARED = tuple(COLUMNS[name] for name in ("motion", "force_parts", "cut", "account", "wall_times"))
 """The groups that a kernel writes, where they come first."""
 
-_N_OF_BLADE = sum(len(group.columns) for group in _OF_BLADE)
+_N_SHARED = sum(len(group.columns) for group in _SHARED)
+
+_AT_ACCOUNT = 36
+"""Where the account of energy begins in a row."""
+_N_ACCOUNT = len(ACCOUNT)
+
+_NO_ACCOUNT = np.zeros(0)
 
 
-class _AtBlade(NamedTuple):
-    """Contacts of the blade, and their stiffness."""
+class _OfResult(NamedTuple):
+    """What a row has of the result of a step."""
 
     normal: FloatArray
     normal_force: FloatArray
     friction: FloatArray
     stiffness: FloatArray
+    account: FloatArray
+    """No numbers without an account."""
+    cut_area: float
+    finished_area: float
+    n_tetrahedra: int
+    anchored_length: float
+    work_of_blade: float
 
 
 class RowWriter:
@@ -35,24 +57,23 @@ class RowWriter:
         groups: Columns of the recording, in order.
         recording: The recording.
         is_parallel: Whether all results are of a tissue in this process whose frame is parallel to
-            the world. Then a kernel writes the columns of the blade, from arrays that are there.
+            the world. Then a kernel writes the shared columns, from arrays that are there.
     """
 
     def __init__(
         self, groups: Sequence[ColumnGroup], recording: Recording, is_parallel: bool
     ) -> None:
         self._groups = groups
-        self._others = groups[len(_OF_BLADE) :]
+        self._others = groups[len(_SHARED) :]
         self._recording = recording
-        self._has_kernel = is_parallel and tuple(groups[: len(_OF_BLADE)]) == _OF_BLADE
+        self._has_kernel = is_parallel and tuple(groups[: len(_SHARED)]) == _SHARED
         self._write = SameTypes(_write)
         if self._has_kernel:
             # Compiled for floats, and before the first frame.
-            none, nine = np.zeros((0, 3)), (0.0,) * 9
-            at_blade = _AtBlade(none, np.zeros(0), none, np.zeros((6, 6)))
-            self._write.call(
-                np.zeros((1, _N_OF_BLADE)), 0, 0.0, nine, nine, nine, at_blade, (0.0,) * 5
-            )
+            none, nine, zeros = np.zeros((0, 3)), (0.0,) * 9, (0.0,) * 6
+            arrays = none, np.zeros(0), none, np.zeros((6, 6)), _NO_ACCOUNT
+            result = _OfResult(*arrays, 0.0, 0.0, 0, 0.0, 0.0)
+            self._write.call(np.zeros((1, _N_SHARED)), 0, 0.0, nine, nine, nine, result, zeros)
 
     def append(self, frame: FrameData) -> None:
         """Add the row of a frame.
@@ -64,7 +85,7 @@ class RowWriter:
             self._recording.append(frame_row(self._groups, frame))
             return
         result = frame.result
-        contacts = result.contacts_of_blade
+        contacts, account = result.contacts_of_blade, result.account
         room, at = self._recording.room_for_a_row()
         self._write.call(
             room,
@@ -73,16 +94,22 @@ class RowWriter:
             frame.blade.numbers,
             frame.felt.numbers,
             frame.raw.numbers,
-            _AtBlade(contacts.normal, contacts.normal_force, contacts.friction, result.stiffness),
-            (
+            _OfResult(
+                contacts.normal,
+                contacts.normal_force,
+                contacts.friction,
+                result.stiffness,
+                _NO_ACCOUNT if account is None else account,
                 result.cut_area,
                 result.finished_area,
                 result.n_tetrahedra,
                 result.anchored_length,
                 result.work_of_blade,
             ),
+            (*frame.wall_times, perf_counter() - frame.recorded_since),
         )
-        self._recording.end_row(_N_OF_BLADE, frame_row(self._others, frame))
+        others = frame_row(self._others, frame) if self._others else ()
+        self._recording.end_row(_N_SHARED, others)
 
 
 @kernel
@@ -93,10 +120,10 @@ def _write(
     blade: _Nine,
     felt: _Nine,
     raw: _Nine,
-    at_blade: _AtBlade,
-    cut: _Five,
+    result: _OfResult,
+    wall_times: _Six,
 ) -> None:
-    """Write the columns of `_OF_BLADE`.
+    """Write the columns of `_SHARED`.
 
     Args:
         room: Rows of the recording.
@@ -105,8 +132,8 @@ def _write(
         blade: `FrameData.blade`.
         felt: `FrameData.felt`.
         raw: `FrameData.raw`.
-        at_blade: Contacts of the blade.
-        cut: What it has done so far.
+        result: `FrameData.result`.
+        wall_times: Wall times of the frame, and that of its recording so far [s].
     """
     row = room[at]
     row[0] = time
@@ -115,12 +142,17 @@ def _write(
     for i in range(6):
         row[4 + i] = felt[i]
         row[10 + i] = raw[i]
-    forward, stiffness = (blade[6], blade[7], blade[8]), at_blade.stiffness
-    add_up(at_blade.normal, at_blade.normal_force, at_blade.friction, forward, row[16:25])
+    forward, stiffness = (blade[6], blade[7], blade[8]), result.stiffness
+    add_up(result.normal, result.normal_force, result.friction, forward, row[16:25])
     for axis in range(3):
         row[25 + axis] = stiffness[axis, axis]
     row[28] = stiffness[0, 1]
     row[29] = stiffness[0, 2]
     row[30] = stiffness[1, 2]
-    for i in range(5):
-        row[31 + i] = cut[i]
+    row[31], row[32], row[33] = result.cut_area, result.finished_area, result.n_tetrahedra
+    row[34], row[35] = result.anchored_length, result.work_of_blade
+    account = result.account
+    for i in range(_N_ACCOUNT):
+        row[_AT_ACCOUNT + i] = account[1 + i] if len(account) > 0 else math.nan
+    for i in range(6):
+        row[_AT_ACCOUNT + _N_ACCOUNT + i] = wall_times[i]

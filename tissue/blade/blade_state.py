@@ -11,6 +11,7 @@ from tissue.blade.toughness import ToughnessLaw, toughness_law_of
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
+from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays, FloatCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub
 from tissue.material import Material
@@ -128,9 +129,10 @@ def add_to_node(
         force: Force of the blade on the tissue [N].
         seconds: How long the force acts [s].
     """
-    external[node, 0] += weight * force.x
-    external[node, 1] += weight * force.y
-    external[node, 2] += weight * force.z
+    row = natural(node)
+    external[row, 0] += weight * force.x
+    external[row, 1] += weight * force.y
+    external[row, 2] += weight * force.z
     before = running.impulse_on_tissue
     on_tissue = Vec3(
         before.x + seconds * weight * force.x,

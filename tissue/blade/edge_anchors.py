@@ -12,9 +12,10 @@ import numpy as np
 from tissue.blade.body_sheets import BodySheets, new_body_sheets
 from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
-from tissue.blade.toughness import ToughnessLaw, skin_toughness_at, toughness_at
+from tissue.blade.toughness import ToughnessLaw, toughening_at
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
+from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, axpy, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import interpolate
@@ -74,10 +75,10 @@ class Anchors(Arrays):
     (`begin_account`) [m], shape (n, 3)."""
     impulse: FloatArray
     """Impulse of the anchor on the tissue since then [N s], shape (n, 3)."""
-    speed: FloatArray
-    """Forward speed of the sample of the edge in this step [m/s], shape (n,). It decides the
-    toughness. With the speed of the anchor itself, from one short step to the next, the anchor
-    would stick and slip by turns."""
+    toughening: FloatArray
+    """Share by which the tissue is tougher than in a slow cut, by the forward speed of the sample
+    of the edge in this step (`toughening_at`), shape (n,). With the speed of the anchor itself,
+    from one short step to the next, the anchor would stick and slip by turns."""
     rest_share: FloatArray
     """Area at rest over area as it is, of what the anchor cuts next; shape (n,). Toughness is an
     energy per area at rest (Rivlin and Thomas 1953), and tissue ahead of an edge is squeezed."""
@@ -134,7 +135,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         offset=np.zeros(n),
         stretch=np.zeros((n, 3)),
         impulse=np.zeros((n, 3)),
-        speed=np.zeros(n),
+        toughening=np.zeros(n),
         rest_share=np.ones(n),
         rest_area=np.zeros((n, 3)),
         slips=np.zeros(n, dtype=np.bool_),
@@ -146,13 +147,14 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
 
 
 @kernel
-def measure_speeds(anchors: Anchors, edge: Edge, dt: float) -> None:
-    """Write the forward speed of each sample in a time step of `dt` [s]."""
+def measure_toughening(anchors: Anchors, edge: Edge, dt: float, law: ToughnessLaw) -> None:
+    """Write the toughening at the forward speed of each sample in a time step of `dt` [s]."""
     n = len(anchors.state)
     forward = pose_at(edge, 0.5).forward
     for k in range(n):
         moved = sample_displacement(edge, k, n)
-        anchors.speed[k] = max(dot(moved, forward), 0.0) / dt if dt > 0.0 else 0.0
+        speed = max(dot(moved, forward), 0.0) / dt if dt > 0.0 else 0.0
+        anchors.toughening[k] = toughening_at(law, speed)
 
 
 @kernel
@@ -188,8 +190,8 @@ def n_holding_nodes(anchors: Anchors, k: int) -> int:
 def holding_node(anchors: Anchors, body: Body, k: int, i: int) -> int:
     """Return node `i` of those that hold anchor `k`."""
     if i < 4:
-        return body.tetrahedra[anchors.tetrahedron[k], i]  # type: ignore[no-any-return]
-    return anchors.coarse.nodes[k, i - 4]  # type: ignore[no-any-return]
+        return body.tetrahedra[natural(anchors.tetrahedron[k]), natural(i)]  # type: ignore[no-any-return]
+    return anchors.coarse.nodes[k, natural(i - 4)]  # type: ignore[no-any-return]
 
 
 @inlined
@@ -197,17 +199,18 @@ def holding_weight(anchors: Anchors, k: int, i: int) -> float:
     """Return the weight of node `i` of those that hold anchor `k`."""
     share: float = anchors.coarse.share[k]
     if i < 4:
-        return (1.0 - share) * anchors.weights[k, i]  # type: ignore[no-any-return]
-    return share * anchors.coarse.weights[k, i - 4]  # type: ignore[no-any-return]
+        return (1.0 - share) * anchors.weights[k, natural(i)]  # type: ignore[no-any-return]
+    return share * anchors.coarse.weights[k, natural(i - 4)]  # type: ignore[no-any-return]
 
 
 @kernel
 def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area as it is now at which anchor `k` slips [J/m2]."""
     share: float = anchors.rest_share[k]
+    toughness: float = law.toughness * (1.0 + anchors.toughening[k])
     if anchors.at_skin[k]:
-        return share * skin_toughness_at(law, anchors.speed[k])
-    return share * toughness_at(law, anchors.speed[k])
+        return share * max(law.skin_toughness, toughness)
+    return share * toughness
 
 
 @kernel

@@ -6,7 +6,7 @@ from tissue.blade.edge_anchors import (
     ANCHORED,
     anchors_energy,
     holding_node,
-    measure_speeds,
+    measure_toughening,
     n_holding_nodes,
 )
 from tissue.blade.edge_forces import (
@@ -77,10 +77,10 @@ def begin_blade_step(
     for k in range(len(anchors.state)):
         anchors.cut[k] = 0.0
     if blade.toughness.exponent == 0.0:  # then speed does not change the energy
-        measure_speeds(anchors, edge, dt)
+        measure_toughening(anchors, edge, dt, blade.toughness)
         return True
     before = edge_energy(blade, body, edge, 0.0)
-    measure_speeds(anchors, edge, dt)
+    measure_toughening(anchors, edge, dt, blade.toughness)
     measure_tip_speeds(blade.spine, edge, dt)
     # A slower edge has a lower yield limit: the energy beyond it is spent on the next slip.
     after = edge_energy(blade, body, edge, 0.0)

@@ -1,7 +1,6 @@
 """`BladeInteraction`: the anchors and side contacts of one body with the blade, and the wrench."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from tissue.blade.blade_context import (
     NOT_SEARCHED,
     BladeContext,
     release_sides,
-    report_step,
     update_anchors,
     update_faces,
 )
@@ -25,13 +23,7 @@ from tissue.blade.return_mapping import relocate
 from tissue.blade.spine_contact import new_spine_contacts
 from tissue.blade.spine_search import relocate_spine
 from tissue.blade.toughness import toughness_law_of
-from tissue.blade.wrench import (
-    BladeReport,
-    WrenchReport,
-    blade_report,
-    contacts_of,
-    new_report,
-)
+from tissue.blade.wrench import contacts_of, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import SameTypes
@@ -57,13 +49,8 @@ size."""
 CUT_MARGIN = 0.5
 """Distance outside the skin at which the cut begins and ends, per mean node size."""
 
-_REPORT = SameTypes(report_step)
 _RELOCATE, _RELOCATE_SPINE = SameTypes(relocate), SameTypes(relocate_spine)
 _FORGET_CHANGED = SameTypes(forget_changed_faces)
-
-
-AddToReport = Callable[[WrenchReport], None]
-"""Adds the forces on the blade besides those of the tissue."""
 
 
 class BladeInteraction:
@@ -115,7 +102,10 @@ class BladeInteraction:
     @property
     def contacts(self) -> RigidContacts:
         """Contacts of the blade at the end of the last step: views, which the next step changes."""
-        return contacts_of(self.latest_report, self.latest_report.n_contacts)
+        n, views = self.latest_report.n_contacts, self._views
+        if n not in views:
+            views[n] = contacts_of(self.latest_report, n)
+        return views[n]
 
     @property
     def has_faces(self) -> bool:
@@ -291,15 +281,6 @@ class BladeInteraction:
             self.grid = build_grid(body, body.positions, margin)
             forget_cells(self.state.sides)
         return self.renewed(context)
-
-    def report(
-        self, context: BladeContext, edge: Edge, dt: float, also: AddToReport | None = None
-    ) -> BladeReport:
-        """Return what a time step of `dt` [s] came to, and what `also` adds to that."""
-        _REPORT.call(context, edge, dt)
-        if also is not None:
-            also(self.latest_report)
-        return blade_report(self.latest_report, self._views)
 
     def all_nodes(self, body: Body) -> IntArray:
         """Return 0, 1, 2, ... up to the room that the body has for nodes."""

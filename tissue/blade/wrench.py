@@ -5,8 +5,7 @@ The wrench at the end, its stiffness and the contacts follow from the same point
 torques cancel but for rounding.
 """
 
-from operator import attrgetter
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,15 +27,12 @@ from tissue.blade.spine_contact import (
     spine_side,
     touched_point,
 )
-from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.lazy_fields import lazy_fields
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.three_vectors import Wrench
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
-from tissue.types import RigidContacts, StepResult
+from tissue.types import RigidContacts
 
 
 class WrenchReport(Arrays):
@@ -69,7 +65,8 @@ class WrenchReport(Arrays):
     amounts: FloatArray
     """The numbers of `Amounts`."""
     plain: FloatArray
-    """All that a result has in plain numbers: mean wrench, tip, wrench, mean force, amounts."""
+    """All but the contacts in plain numbers: mean wrench, tip, wrench, mean force, amounts, bounds,
+    stiffness."""
 
 
 class Amounts(NamedTuple):
@@ -91,12 +88,18 @@ class Amounts(NamedTuple):
     """Toughness times area cut since the start [J]."""
 
 
+AMOUNTS = slice(18, 18 + len(Amounts._fields))
+BOUNDS = slice(AMOUNTS.stop, AMOUNTS.stop + 6)
+STIFFNESS = slice(BOUNDS.stop, BOUNDS.stop + 36)
+"""Places in `WrenchReport.plain`."""
+
+
 def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
     """Return a report without contacts, with room for all of the blade, and `n_more`."""
     capacity = (
         n_more + len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.spine.state)
     )
-    plain = np.zeros(18 + len(Amounts._fields))
+    plain = np.zeros(STIFFNESS.stop)
     return WrenchReport(
         n_contacts=0,
         point=np.zeros((capacity, 3)),
@@ -108,59 +111,10 @@ def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
         mean_wrench=plain[0:6].reshape(2, 3),
         mean_force_on_tissue=plain[15:18],
         tip=plain[6:9],
-        bounds=np.zeros((2, 3)),
-        stiffness=np.zeros((6, 6)),
-        amounts=plain[18:],
+        bounds=plain[BOUNDS].reshape(2, 3),
+        stiffness=plain[STIFFNESS].reshape(6, 6),
+        amounts=plain[AMOUNTS],
         plain=plain,
-    )
-
-
-class BladeReport(NamedTuple):
-    """A copy of what a report came to."""
-
-    mean_wrench: Wrench
-    """Mean wrench of the tissue on the blade in the time step, about the tip."""
-    stiffness: FloatArray
-    """Change of the wrench at the end of the step with the pose of the blade, shape (6, 6)."""
-    contacts: RigidContacts
-    """The blade's contacts at the end of the step; views of the report, which the next changes."""
-    bounds: FloatArray
-    """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
-    amounts: Amounts
-    """Single numbers."""
-    plain: list[float]
-    """`WrenchReport.plain`."""
-
-    @property
-    def wrench(self) -> Wrench:
-        """The wrench at the end of the step."""
-        wrench, tip = np.array(self.plain[9:15]), np.array(self.plain[6:9])
-        return Wrench(wrench[:3], wrench[3:], tip)
-
-    @property
-    def mean_force_on_tissue(self) -> FloatArray:
-        """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
-        return np.array(self.plain[15:18])
-
-
-def blade_report(report: WrenchReport, views: dict[int, RigidContacts]) -> BladeReport:
-    """Return a copy of what was reported last.
-
-    `views`: views of the first contacts of the report by their number, as far as they were made.
-    """
-    plain = report.plain.tolist()
-    a, b, c, d, e, f, g, h, i = plain[:9]
-    amounts = Amounts(*plain[18:])
-    n = int(amounts.n_contacts)
-    if n not in views:
-        views[n] = contacts_of(report, n)
-    return BladeReport(
-        Wrench.of_numbers((a, b, c, d, e, f, g, h, i)),
-        report.stiffness.copy(),
-        views[n],
-        report.bounds.copy(),
-        amounts,
-        plain,
     )
 
 
@@ -174,43 +128,6 @@ def contacts_of(report: WrenchReport, n: int) -> RigidContacts:
         report.cut_area[:n],
         np.full(n, -1),
     )
-
-
-@lazy_fields(
-    contacts=lambda result: result.all_contacts(),
-    wrench_t1=lambda result: result.report.wrench,
-    force_on_tissue=lambda result: result.report.mean_force_on_tissue,
-)
-class LazyResult(StepResult):
-    """The result of a step, with a copy of what the blade reported."""
-
-    report: BladeReport
-    geoms: GeomContact | None
-    has_views = True
-    """Contacts are views of the report of the blade."""
-    contacts_of_blade = property(attrgetter("report.contacts"))
-
-    @classmethod
-    def of(cls, report: BladeReport, geoms: GeomContact | None, *others: object) -> Self:
-        """Return the result of a step.
-
-        Args:
-            report: That of the blade.
-            geoms: Contact with geoms, where there is any.
-            others: The fields of `StepResult` after bounds.
-        """
-        first = (report.mean_wrench, None, report.stiffness, None, None, report.bounds)
-        result: Self = tuple.__new__(cls, (*first, *others))
-        result.report, result.geoms = report, geoms
-        return result
-
-    def all_contacts(self) -> RigidContacts:
-        """Return the contacts of the blade, and behind them those of geoms."""
-        of_blade = self.report.contacts
-        if self.geoms is None:
-            return of_blade
-        both = zip(of_blade, self.geoms.contacts(), strict=True)
-        return RigidContacts._make(map(np.concatenate, both))
 
 
 @kernel

@@ -107,6 +107,8 @@ class Arrays:
         TypeError: fields are missing or unknown, or an array is not C-contiguous.
     """
 
+    n_made: ClassVar[int] = 0
+    """How many structs were made: while it stays, no struct was replaced by a new one."""
     _numba_type_: ArraysType
     _types: ClassVar[dict[Any, ArraysType]] = {}
     _most_types: ClassVar[int] = 1
@@ -131,6 +133,7 @@ class Arrays:
             delattr(cls, name)
 
     def __init__(self, **fields: Any) -> None:
+        Arrays.n_made += 1
         annotations = type(self).__annotations__
         if set(annotations) != set(fields):
             names = list(annotations)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined
+from tissue.core.simd_rows import natural
 
 
 class Vec3(NamedTuple):
@@ -18,15 +19,17 @@ class Vec3(NamedTuple):
 @inlined
 def vec3(array: FloatArray, i: int) -> Vec3:
     """Return row `i` of an array of shape (n, 3)."""
-    return Vec3(array[i, 0], array[i, 1], array[i, 2])
+    row = natural(i)
+    return Vec3(array[row, 0], array[row, 1], array[row, 2])
 
 
 @inlined
 def store(array: FloatArray, i: int, a: Vec3) -> None:
     """Write `a` into row `i` of an array of shape (n, 3)."""
-    array[i, 0] = a.x
-    array[i, 1] = a.y
-    array[i, 2] = a.z
+    row = natural(i)
+    array[row, 0] = a.x
+    array[row, 1] = a.y
+    array[row, 2] = a.z
 
 
 @inlined

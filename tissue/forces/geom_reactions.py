@@ -15,7 +15,7 @@ from tissue.contact.geoms.geom_arrays import GeomContacts, n_corners
 from tissue.contact.geoms.kinematic_contact import (
     SWEEPS,
     add_to_nodes,
-    mobility_at,
+    note_mobility,
     push,
     weighted,
 )
@@ -25,7 +25,6 @@ from tissue.core.simd import store_point
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.forces.acceleration import acceleration
 from tissue.forces.step_context import StepContext
-from tissue.mesh.body import Body
 
 
 @kernel
@@ -49,7 +48,7 @@ def add_geom_reactions(
     for _ in range(SWEEPS if contacts.are_coupled == 1 else 1):
         for c in rows:
             if contacts.touches[c] == 1:
-                _correct_reaction(contacts, context.body, c)
+                _correct_reaction(contacts, c)
     for c in rows:
         if contacts.touches[c] == 1:
             _act(context, c, vec3(contacts.reaction, c), positions, velocities, share * dt, dt)
@@ -75,25 +74,26 @@ def _note_accelerations(
                 store_point(accelerations, node, acceleration(context, node, positions, velocities))
     for c in rows:
         if contacts.touches[c] == 1:
+            note_mobility(contacts, body, c)  # nodes may have got mass since the last substep
             store(contacts.reaction, c, Vec3(0.0, 0.0, 0.0))
-            _change_reaction(contacts, body, c, vec3(contacts.force, c))
+            _change_reaction(contacts, c, vec3(contacts.force, c))
 
 
 @kernel
-def _change_reaction(contacts: GeomContacts, body: Body, c: int, change: Vec3) -> None:
+def _change_reaction(contacts: GeomContacts, c: int, change: Vec3) -> None:
     """Add to the reaction of contact `c` [N], and to the accelerations of its nodes."""
     store(contacts.reaction, c, add(vec3(contacts.reaction, c), change))
-    add_to_nodes(contacts, body, c, change, contacts.acceleration)
+    add_to_nodes(contacts, c, change, contacts.acceleration)
 
 
 @kernel
-def _correct_reaction(contacts: GeomContacts, body: Body, c: int) -> None:
+def _correct_reaction(contacts: GeomContacts, c: int) -> None:
     """Change the reaction of contact `c` so that its point does not accelerate into the geom.
 
     What sticks does not accelerate along it either. What slides is braked as it was in the last
     substep; by how much it must be braked more or less is known after this one.
     """
-    mobility = mobility_at(contacts, body, c)
+    mobility = contacts.mobility[c]
     if mobility == 0.0:
         return
     normal, before = vec3(contacts.normal, c), vec3(contacts.reaction, c)
@@ -104,7 +104,7 @@ def _correct_reaction(contacts: GeomContacts, body: Body, c: int) -> None:
     pull = axpy(-dot(now, normal), normal, now)
     limit, length = contacts.geoms.friction[contacts.geom[c]] * press, norm(pull)
     share = min(limit / length, 1.0) if length > 0.0 else 0.0
-    _change_reaction(contacts, body, c, sub(axpy(press, normal, scale(share, pull)), before))
+    _change_reaction(contacts, c, sub(axpy(press, normal, scale(share, pull)), before))
 
 
 @kernel

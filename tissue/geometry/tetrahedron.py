@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.simd_rows import natural
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 
 
@@ -116,12 +117,13 @@ def barycentric(p: Vec3, a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Weights:
 @kernel
 def barycentric_in(p: Vec3, positions: FloatArray, tetrahedra: IntArray, t: int) -> Weights:
     """Return the barycentric weights of `p` in tetrahedron `t`."""
+    row = natural(t)
     return barycentric(
         p,
-        vec3(positions, tetrahedra[t, 0]),
-        vec3(positions, tetrahedra[t, 1]),
-        vec3(positions, tetrahedra[t, 2]),
-        vec3(positions, tetrahedra[t, 3]),
+        vec3(positions, tetrahedra[row, 0]),
+        vec3(positions, tetrahedra[row, 1]),
+        vec3(positions, tetrahedra[row, 2]),
+        vec3(positions, tetrahedra[row, 3]),
     )
 
 
@@ -142,10 +144,9 @@ def clipped(w: Weights) -> Weights:
 @kernel
 def interpolate(w: Weights, values: FloatArray, tetrahedra: IntArray, t: int) -> Vec3:
     """Return the value at weights `w` of a field given at the nodes, shape (n_nodes, 3)."""
-    a = tetrahedra[t, 0]
-    b = tetrahedra[t, 1]
-    c = tetrahedra[t, 2]
-    d = tetrahedra[t, 3]
+    row = natural(t)
+    a, b = natural(tetrahedra[row, 0]), natural(tetrahedra[row, 1])
+    c, d = natural(tetrahedra[row, 2]), natural(tetrahedra[row, 3])
     return Vec3(
         w.a * values[a, 0] + w.b * values[b, 0] + w.c * values[c, 0] + w.d * values[d, 0],
         w.a * values[a, 1] + w.b * values[b, 1] + w.c * values[c, 1] + w.d * values[d, 1],

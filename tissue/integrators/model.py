@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.blade_context import BladeContext
 from tissue.blade.edge import Edge
 from tissue.blade.interaction import BladeInteraction
-from tissue.blade.wrench import BladeReport
 from tissue.blade_shape import BladeShape
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact, no_geoms
@@ -263,19 +261,19 @@ class TissueModel:
         self.stages = new_stages(n_nodes)
         self.touched = np.zeros(n_nodes, dtype=np.int64)
 
-    def report(self, blade: BladeContext, edge: Edge, dt: float) -> BladeReport:
-        """Return what a time step of `dt` [s] came to for the blade; bounds hold fibres too."""
+    def report_fibres(self, edge: Edge) -> None:
+        """Add the fibres, where there are any, to what the blade reported: forces and bounds."""
         if not self.has_fibres:
-            return self.interaction.report(blade, edge, dt)
-        fibres, positions = self.attachments, self.body.positions
-        found = self.interaction.report(
-            blade, edge, dt, lambda report: report_fibres(report, fibres, positions, edge)
+            return
+        report, fibres, positions = (
+            self.interaction.latest_report,
+            self.attachments,
+            self.body.positions,
         )
-        boxes = fibre_boxes(fibres, positions)
-        low = boxes[:, 0].min(axis=0, initial=math.inf)
-        high = boxes[:, 1].max(axis=0, initial=-math.inf)
-        bounds = (np.minimum(found.bounds[0], low), np.maximum(found.bounds[1], high))
-        return found._replace(bounds=np.stack(bounds))
+        report_fibres(report, fibres, positions, edge)
+        boxes, (low, high) = fibre_boxes(fibres, positions), report.bounds
+        low[:] = np.minimum(low, boxes[:, 0].min(axis=0, initial=math.inf))
+        high[:] = np.maximum(high, boxes[:, 1].max(axis=0, initial=-math.inf))
 
     def measures(self, method: int) -> MeshMeasures:
         """Return what bounds the time step of the body now.

@@ -47,6 +47,7 @@ RULES = StateRules(
         "GlobalStepper._parts": tuple,
         "StepStages._frame": _none,
         "StepStages._parts": tuple,
+        "StepStages._n_made": int,
         "Scheme._cut": _none,
         "BodyChunks._nodes": _none,
     },

@@ -22,6 +22,7 @@ from tissue.loads.handles import StepInputs
 from tissue.mesh.body import Body
 from tissue.mesh.node_motion import is_motion_finite
 from tissue.state.tissue_state import RULES
+from tissue.stepping.energy_audit import RESIDUAL
 from tissue.stepping.judgement import StepWatch
 from tissue.stepping.stages import FAULT_BEFORE, StepStages
 from tissue.types import StepResult, TissueError
@@ -144,10 +145,7 @@ class CheckedSteps:
         except BaseException:
             self._is_changed = True  # what was done of it is not in the log
             raise
-        energies = result.energies
-        residual = 0.0 if energies is None else energies.residual
-        amounts = (stages.audit.work_of_loads, residual, sum(result.wrench.numbers))
-        fault = self.watch.fault(stages.context, inputs.dt, *amounts)
+        fault = self.watch.fault(stages.frame_now(), inputs.dt)
         return (result, "") if fault is None else (None, fault)
 
     def _repeat(self, inputs: StepInputs, fault: str) -> StepResult:
@@ -193,9 +191,11 @@ class CheckedSteps:
         self._n_substeps = 0
         audit, context = self._stages.audit, self._stages.context
         edge, when = self._stages.model.interaction.edge_now
-        energies = audit.energies(context, edge)
-        residual = 0.0 if energies is None else energies.residual
-        self.watch.begin(context, edge, when, audit.work_of_loads, residual)
+        if audit.is_kept:
+            audit.update(context, edge, 1.0)
+        account = audit.account
+        residual = float(account.energies[RESIDUAL])
+        self.watch.begin(context, edge, when, account.work_of_loads, residual)
         self._is_changed = False
 
     def _state_now(self) -> Memento:

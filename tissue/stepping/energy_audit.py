@@ -1,6 +1,6 @@
 """`Audit`: the account of energy of a body: the work done on it, and where that went."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -8,12 +8,13 @@ from tissue.blade.blade_state import clear_works
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes, kernel
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.elasticity.energy import elastic_energy, kinetic_energy, potential_energy
 from tissue.forces.attachments import attached_energy
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms
 from tissue.mesh.changes import ChangedMesh
-from tissue.types import Energies
+from tissue.types import N_WORKS, Energies
 
 
 class _Amounts(NamedTuple):
@@ -67,6 +68,40 @@ class MeshChanges(NamedTuple):
     """Energy of anchors whose tetrahedron was divided."""
 
 
+N_AMOUNTS = len(_Amounts._fields)
+N_CHANGES = len(MeshChanges._fields)
+"""Numbers of `MeshChanges`, which are of the first of `_Amounts`."""
+
+RESIDUAL: Final = len(Energies._fields)
+"""Place of the residual behind the numbers of `Energies`."""
+
+BODY_IS_KNOWN: Final = 1
+"""The energies of the body itself, the first three of `_Amounts`, are known."""
+ALL_IS_KNOWN: Final = 2
+"""All of `_Amounts` are known."""
+
+
+class Account(Arrays):
+    """The account of energy of one body."""
+
+    is_kept: IntCell
+    """1 where an account is kept; else all numbers but the works here are 0."""
+    work_of_loads: FloatCell
+    """Work of loads, and of what moves attachments, since the account began [J]."""
+    lost_at_geoms: FloatCell
+    """Energy lost in contacts with rigid geoms since the account began [J]."""
+    attached_at_first: FloatCell
+    """Energy in attachments when it began [J]."""
+    now: FloatArray
+    """The numbers of `_Amounts`, shape (`N_AMOUNTS`,)."""
+    at_first: FloatArray
+    """Those when the account began."""
+    changes: FloatArray
+    """What changes of the mesh added since then: the numbers of `MeshChanges`."""
+    energies: FloatArray
+    """The numbers of `Energies`, and their residual."""
+
+
 @kernel
 def _write_amounts(
     context: StepContext, edge: Edge, when: float, is_known: bool, out: FloatArray
@@ -78,7 +113,7 @@ def _write_amounts(
         edge: The cutting edge over a time step.
         when: Instant of it, as a fraction.
         is_known: Whether the energies of the body itself, the first three, are known.
-        out: Written, shape (15,).
+        out: Written, shape (`N_AMOUNTS`,).
     """
     body, elastic, blade = context.body, context.elastic, context.blade
     if not is_known:
@@ -95,12 +130,54 @@ def _write_amounts(
     out[13], out[14] = elastic.scaling.lost, totals.released
 
 
-def _attached(context: StepContext) -> float:
+@kernel
+def attached_now(context: StepContext) -> float:
     """Return the energy in the springs of attachments [J]."""
     attachments = context.attachments
     if not len(attachments.nodes):
         return 0.0
-    return attached_energy(attachments, context.body.positions, 0, len(attachments.nodes))
+    energy: float = attached_energy(attachments, context.body.positions, 0, len(attachments.nodes))
+    return energy
+
+
+@kernel
+def write_energies(
+    account: Account, context: StepContext, edge: Edge, when: float, known: int
+) -> None:
+    """Write the energies at an instant, and their residual.
+
+    Args:
+        account: Written.
+        context: The body and all that acts on it.
+        edge: The cutting edge over a time step.
+        when: Instant of it, as a fraction.
+        known: `BODY_IS_KNOWN`, `ALL_IS_KNOWN`, or 0.
+    """
+    now, first, out = account.now, account.at_first, account.energies
+    if known != ALL_IS_KNOWN:
+        _write_amounts(context, edge, when, known == BODY_IS_KNOWN, now)
+    attachments, attached = context.attachments, attached_now(context) - account.attached_at_first
+    in_contacts = now[5] - first[5]
+    # What the body gave to contacts, and their springs do not hold.
+    lost_in_contacts = (first[6] - now[6]) - in_contacts
+    out[0], out[1], out[2] = now[7], account.work_of_loads, now[8]
+    for i in range(3):
+        out[3 + i] = now[i] - first[i]
+    out[6] = now[3] + now[4] + in_contacts + attached
+    out[7] = now[9] + attachments.dissipated
+    out[8], out[9], out[10] = now[10], now[11] + attachments.severing, now[12]
+    out[11] = account.lost_at_geoms + lost_in_contacts
+    out[12] = now[13] - _sum(account.changes, 0, N_CHANGES)
+    out[13] = now[14] + attachments.released
+    out[RESIDUAL] = _sum(out, 0, N_WORKS) - _sum(out, N_WORKS, RESIDUAL)
+
+
+@kernel
+def _sum(numbers: FloatArray, begin: int, end: int) -> float:
+    total = 0.0
+    for i in range(begin, end):
+        total += numbers[i]
+    return total
 
 
 class Audit:
@@ -113,37 +190,46 @@ class Audit:
     """
 
     def __init__(self, *, is_kept: bool) -> None:
-        self._is_kept = is_kept
-        self.changes = MeshChanges()
-        """What changes of the mesh added since the account began."""
-        self._before_cut = self.changes
-        self.work_of_loads = 0.0
-        """Work of loads, and of what moves attachments, since the account began [J]."""
-        self.lost_at_geoms = 0.0
-        """Energy lost in contacts with rigid geoms since the account began [J]."""
-        self._attached_at_first = 0.0
+        self.account = Account(
+            is_kept=int(is_kept),
+            work_of_loads=0.0,
+            lost_at_geoms=0.0,
+            attached_at_first=0.0,
+            now=np.zeros(N_AMOUNTS),
+            at_first=np.zeros(N_AMOUNTS),
+            changes=np.zeros(N_CHANGES),
+            energies=np.zeros(RESIDUAL + 1),
+        )
+        """Its numbers."""
+        self.is_kept = is_kept
+        """Whether an account is kept."""
+        self._before_cut = np.zeros(N_CHANGES)
         self.is_known = False
         """Whether the energy is known: the body has not moved since, nor its mesh changed."""
-        self._numbers = np.zeros(len(_Amounts._fields))
-        self._now = self._at_first = _Amounts(*self._numbers)
-        self._write = SameTypes(_write_amounts)
+        self._write, self._attached = SameTypes(write_energies), SameTypes(attached_now)
         self._of: tuple[Edge | None, float] = (None, 0.0)
+
+    @property
+    def changes(self) -> MeshChanges:
+        """What changes of the mesh added since the account began."""
+        return MeshChanges(*self.account.changes.tolist())
 
     def begin(self, context: StepContext, edge: Edge) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
-        if not self._is_kept:
+        if not self.is_kept:
             return
+        account, attachments = self.account, context.attachments
         context.damping.is_counted = 1
-        context.damping.dissipated = self.lost_at_geoms = 0.0
-        self.changes = MeshChanges()
+        context.damping.dissipated = account.lost_at_geoms = 0.0
+        account.changes[:] = 0.0
         clear_works(context.blade.totals)
-        context.supports.work = self.work_of_loads = 0.0
+        context.supports.work = account.work_of_loads = 0.0
         context.elastic.scaling.lost = 0.0
-        attachments = context.attachments
         attachments.dissipated = attachments.severing = attachments.released = 0.0
-        self._attached_at_first = _attached(context)
+        account.attached_at_first = self._attached.call(context)
         self.forget()
-        self._at_first = self._amounts(context, edge, 1.0)
+        self.update(context, edge, 1.0)
+        account.at_first[:] = account.now
 
     def forget(self) -> None:
         """Forget the energy: the body moved, or its mesh changed."""
@@ -159,52 +245,28 @@ class Audit:
 
     def before_cut(self, context: StepContext, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
-        if self._is_kept:
-            self._before_cut = self._parts(context, edge, when)
+        if self.is_kept:
+            self.update(context, edge, when)
+            self._before_cut[:] = self.account.now[:N_CHANGES]
 
     def after_cut(self, context: StepContext, edge: Edge, when: float) -> None:
         """Count the energy that the change of the mesh took; where it has not changed, none."""
-        if self._is_kept and not self.is_known:
-            parts = zip(
-                self.changes, self._before_cut, self._parts(context, edge, when), strict=True
-            )
-            self.changes = MeshChanges(*(sum_ + after - before for sum_, before, after in parts))
+        if self.is_kept and not self.is_known:
+            self.update(context, edge, when)
+            changes = self.account.changes
+            changes[:] = changes + self.account.now[:N_CHANGES] - self._before_cut
 
-    def energies(self, context: StepContext, edge: Edge) -> Energies | None:
-        """Return the account at the end of a step; None where none is kept."""
-        if not self._is_kept:
-            return None
-        now, first = self._amounts(context, edge, 1.0), self._at_first
-        attachments, attached = context.attachments, _attached(context) - self._attached_at_first
-        in_contacts = now.in_contacts - first.in_contacts
-        # What the body gave to contacts, and their springs do not hold.
-        lost_in_contacts = (first.work_of_contacts - now.work_of_contacts) - in_contacts
-        return Energies(
-            work_of_blade=now.work_of_blade,
-            work_of_loads=self.work_of_loads,
-            work_of_supports=now.work_of_supports,
-            elastic=now.elastic - first.elastic,
-            kinetic=now.kinetic - first.kinetic,
-            potential=now.potential - first.potential,
-            held=now.edge + now.sides + in_contacts + attached,
-            damping=now.damping + attachments.dissipated,
-            cutting=now.cutting,
-            breaking=now.breaking + attachments.severing,
-            friction=now.friction,
-            contact=self.lost_at_geoms + lost_in_contacts,
-            topology=now.mass - sum(self.changes),
-            released=now.released + attachments.released,
-        )
+    def update(self, context: StepContext, edge: Edge, when: float) -> None:
+        """Write the energies at an instant, and their residual."""
+        self._write.call(self.account, context, edge, when, self.take(edge, when))
 
-    def _amounts(self, context: StepContext, edge: Edge, when: float) -> _Amounts:
-        """Return the amounts now; they are remembered until the body moves or its mesh changes."""
-        if not (self.is_known and self._of == (edge, when)):
-            self._write.call(context, edge, when, self.is_known, self._numbers)
-            self._now, self._of = _Amounts(*self._numbers.tolist()), (edge, when)
-            self.is_known = True
-        return self._now
+    def take(self, edge: Edge, when: float) -> int:
+        """Note that the energies will be known at an instant; return what of them is known.
 
-    def _parts(self, context: StepContext, edge: Edge, when: float) -> MeshChanges:
-        """Return the energies of the body and of the anchors [J]."""
-        now = self._amounts(context, edge, when)
-        return MeshChanges(now.elastic, now.kinetic, now.potential, now.edge)
+        What is known is remembered until the body moves or its mesh changes.
+        """
+        known = BODY_IS_KNOWN if self.is_known else 0
+        if self.is_known and self._of == (edge, when):
+            known = ALL_IS_KNOWN
+        self.is_known, self._of = True, (edge, when)
+        return known

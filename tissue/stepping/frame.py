@@ -1,4 +1,4 @@
-"""The begin of a time step in one call: checks, edge, number of increments.
+"""The begin of a time step in one call: checks, edge, number of increments; and its end in another.
 
 Each call from Python costs 1 to 4 us. Where the begin needs something, a call returns; the next one
 continues behind it.
@@ -6,6 +6,7 @@ continues behind it.
 
 from typing import Final
 
+from tissue.blade.blade_context import report_step
 from tissue.blade.edge import Edge, is_other_length
 from tissue.blade.forces import begin_blade_step
 from tissue.contact.search_stages import added_frequency, begin_contacts
@@ -16,6 +17,7 @@ from tissue.cutting.incision import TOO_MANY, count_increments
 from tissue.integrators.driver import Relaxation
 from tissue.integrators.stability import surely_takes_few_steps
 from tissue.mesh.node_motion import is_motion_finite
+from tissue.stepping.energy_audit import Account, write_energies
 
 BEGUN: Final = 0
 """The time step has begun."""
@@ -40,6 +42,8 @@ class FrameContext(Arrays, two_precisions=True):
     """Distance that the edge moves in the time step [m]."""
     relaxation: Relaxation
     """Everything that the relaxation of an increment reads and writes."""
+    account: Account
+    """The account of energy."""
     node_size: float
     """Mean node size [m]."""
 
@@ -102,3 +106,18 @@ def _divide_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
     n = count_increments(frame.travel, frame.node_size)
     frame.n_increments = max(1, n)
     return bool(n != TOO_MANY)
+
+
+@kernel
+def end_frame(frame: FrameContext, edge: Edge, dt: float, known: int) -> None:
+    """Write what a time step came to for the blade, and the account of energy if one is kept.
+
+    Args:
+        frame: The report of the blade and the account are written.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        known: What of the account is known: see `write_energies`.
+    """
+    report_step(frame.relaxation.blade, edge, dt)
+    if frame.account.is_kept == 1:
+        write_energies(frame.account, frame.relaxation.step, edge, 1.0, known)

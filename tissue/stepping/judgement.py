@@ -15,6 +15,8 @@ from tissue.forces.step_context import StepContext
 from tissue.forces.terms import energy_of_terms
 from tissue.geometry.aabb import empty_box, with_point
 from tissue.integrators.model import TissueModel
+from tissue.stepping.energy_audit import RESIDUAL
+from tissue.stepping.frame import FrameContext
 
 STRAIN_UNEXPLAINED = 0.1
 """Energy that may come out of nothing, as a strain of the whole body: a tenth of the speed of waves
@@ -109,20 +111,15 @@ class StepWatch:
         bounds.work, bounds.dissipated = float(now[WORK]) + work_of_loads, float(now[DISSIPATED])
         bounds.residual = residual
 
-    def fault(
-        self, context: StepContext, dt: float, work_of_loads: float, residual: float, force: float
-    ) -> str | None:
+    def fault(self, frame: FrameContext, dt: float) -> str | None:
         """Return what is wrong with a step since it was last examined; None: nothing.
 
         Args:
-            context: The body after it, and all that acts on it.
+            frame: The body after the step, what acts on it, its account of energy, and the report
+                of the blade.
             dt: Length of the step [s].
-            work_of_loads: Work of loads so far [J].
-            residual: That of the account of energy after it, if one is kept, else 0 [J].
-            force: A sum of what the blade feels: finite, or not.
         """
-        bounds = self._bounds
-        found = self._judge.call(context, bounds, dt, work_of_loads, residual, force)
+        found = self._judge.call(frame, self._bounds, dt)
         return None if found == ACCEPTED else self._named(found)
 
     def _named(self, found: int) -> str:
@@ -221,35 +218,31 @@ def energy_in_springs(context: StepContext, edge: Edge, when: float) -> float:
 
 
 @kernel
-def judge_step(
-    context: StepContext,
-    bounds: StepBounds,
-    dt: float,
-    work_of_loads: float,
-    residual: float,
-    force: float,
-) -> int:
+def judge_step(frame: FrameContext, bounds: StepBounds, dt: float) -> int:
     """Return ACCEPTED, or what is wrong with a step.
 
     What is seen after a step that is accepted is what is there before the next one.
 
     Args:
-        context: The body after the step, and all that acts on it.
+        frame: The body after the step, what acts on it, its account of energy, and the report of
+            the blade.
         bounds: What it is judged by; `before`, `after` and `excess` are written.
         dt: Length of the step [s].
-        work_of_loads: Work of loads so far [J].
-        residual: `Energies.residual`, where an account of energy is kept, else 0 [J].
-        force: A sum of what the blade feels: finite, or not.
     """
     before, after = bounds.before, bounds.after
-    write_look(context, after)
+    write_look(frame.relaxation.step, after)
     if after[IS_FINITE] != 1.0:
         return NOT_FINITE_NOW
     # In no time nothing moves, and a blade that cuts is where no motion has led it.
-    found = ACCEPTED if dt == 0.0 else _fault(bounds, dt, work_of_loads, residual)
+    account, found = frame.account, ACCEPTED
+    if dt != 0.0:
+        found = _fault(bounds, dt, account.work_of_loads, account.energies[RESIDUAL])
     if found != ACCEPTED:
         return found
-    if not math.isfinite(force):
+    report, total = frame.relaxation.blade.report, 0.0
+    for axis in range(3):
+        total += report.mean_wrench[0, axis] + report.mean_wrench[1, axis] + report.tip[axis]
+    if not math.isfinite(total):
         return FORCE_NOT_FINITE
     for i in range(LOOK_NUMBERS):
         before[i] = after[i]

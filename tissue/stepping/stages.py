@@ -10,10 +10,10 @@ from tissue.blade.edge import NOWHERE, Edge, edge_of, edge_or_error
 from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade.toughness import expect_toughness_in_range
-from tissue.blade.wrench import LazyResult
 from tissue.body_view import BodyChunks, bounds_of_body
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import SameTypes
+from tissue.core.structs import Arrays
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
 from tissue.cutting.incision import CutHooks, Incision
@@ -41,7 +41,9 @@ from tissue.stepping.frame import (
     TOO_FAR,
     FrameContext,
     begin_frame,
+    end_frame,
 )
+from tissue.stepping.lazy_result import LazyResult
 from tissue.types import Chunks, StageTimes, StepResult
 
 _TOUCHED = SameTypes(touched_nodes)
@@ -86,7 +88,9 @@ class StepStages:
         self._slit_reach = slit_reach
         self._frame: FrameContext | None = None
         self._parts: tuple[object, ...] = ()
+        self._n_made = 0
         self._begin_frame, self._trace = SameTypes(begin_frame), SameTypes(trace)
+        self._end_frame = SameTypes(end_frame)
         self._bounds = bounds_of_body(model.body)
         self._at_first = model.measures(global_stepper.method.number)
         self.make_room()
@@ -161,7 +165,7 @@ class StepStages:
         """
         model, has_blade, outcome = self.model, sweep is not None, BEGUN
         while True:
-            frame = self._frame_now()
+            frame = self.frame_now()
             numbers = dt, model.interaction.edge_length, model.added_by_attachments
             outcome = self._begin_frame.call(frame, edge, has_blade, *numbers, outcome)
             if outcome == BEGUN:
@@ -193,18 +197,17 @@ class StepStages:
 
     def _relax(self, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
-        model, handles, audit = self.model, self.handles, self.audit
+        model, handles, audit, account = self.model, self.handles, self.audit, self.audit.account
         before, is_driven = 0.0, handles.act
         if is_driven:
             if handles.loads.act or handles.attachments.act:
                 self.global_stepper.wake()
             before = handles.begin_increment(increment, has_blade)
-        arrays = self._frame_now().relaxation
-        n = self.integrator.relax(model, arrays, increment, has_blade)
+        n = self.integrator.relax(model, self.frame_now().relaxation, increment, has_blade)
         geoms = model.geoms.arrays
         of_loads = handles.end_increment(before, increment) if is_driven else 0.0
-        audit.work_of_loads += of_loads + geoms.work
-        audit.lost_at_geoms += geoms.dissipated
+        account.work_of_loads += of_loads + geoms.work
+        account.lost_at_geoms += geoms.dissipated
         if n > 0:
             audit.is_known = False
         model.interaction.edge_now = (increment.edge, increment.end)
@@ -212,7 +215,7 @@ class StepStages:
 
     def _detect(self, increment: Increment) -> bool:
         """Trace the path of the edge through the material; return whether it crossed anything."""
-        incision, blade = self.incision, self._frame_now().relaxation.blade
+        incision, blade = self.incision, self.frame_now().relaxation.blade
         travel = self._trace.call(blade, increment.edge, increment.end)
         if travel == NOT_ENGAGED:
             return False
@@ -230,35 +233,30 @@ class StepStages:
         self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, stage_times: StageTimes
     ) -> StepResult:
         """Return what the step did."""
-        model, scheme = self.model, self.incision.scheme
-        frame = self._frame_now()
-        report = model.report(frame.relaxation.blade, edge, dt)
-        amounts, change, geoms = report.amounts, scheme.change, model.geoms
+        model, scheme, audit = self.model, self.incision.scheme, self.audit
+        frame = self.frame_now()
+        self._end_frame.call(frame, edge, dt, audit.take(edge, 1.0))
+        model.report_fibres(edge)
+        change, geoms = scheme.change, model.geoms
         return LazyResult.of(
-            report,
+            frame.relaxation.blade.report,
+            model.interaction.contacts,
             geoms if geoms.arrays.n_contacts > 0 else None,
-            int(amounts.n_tetrahedra),
-            int(amounts.n_nodes),
-            scheme.n_active,
-            int(amounts.tip_tetrahedron) if has_blade else -1,
-            amounts.anchored_length,
-            change.area,
-            change.finished_area,
-            amounts.work_of_blade,
-            amounts.work_of_cutting,
-            n_substeps,
-            model.contact.report(dt),
-            stage_times,
-            self.audit.energies(frame.relaxation.step, edge),
+            audit.account.energies.copy() if audit.is_kept else None,
+            has_blade,
+            (scheme.n_active, change.area, change.finished_area),
+            (n_substeps, model.contact.report(dt), stage_times),
         )
 
     @property
     def context(self) -> StepContext:
         """The body and all that acts on it, as the kernels of an integrator take it."""
-        return self._frame_now().relaxation.step
+        return self.frame_now().relaxation.step
 
-    def _frame_now(self) -> FrameContext:
+    def frame_now(self) -> FrameContext:
         """Return what the kernels of a step work on; another struct where arrays were replaced."""
+        if self._frame is not None and self._n_made == Arrays.n_made:
+            return self._frame
         model, stepper, path = self.model, self.global_stepper, self.incision.path
         interaction, contact, geoms = model.interaction, model.contact, model.geoms
         parts = (
@@ -275,9 +273,11 @@ class StepStages:
                 n_increments=1,
                 travel=0.0,
                 relaxation=stepper.arrays(model, blade),
+                account=self.audit.account,
                 node_size=float(model.node_size),
             )
             self._parts = (*parts[:-1], stepper.choice)
+        self._n_made = Arrays.n_made
         return self._frame
 
     # between steps
@@ -321,6 +321,7 @@ class StepStages:
         cut_along(incision, self.hooks, rows, directions, self.model.node_size)
         self.end_incision()
         incision.path = blade_path
+        self._frame = None  # it may have the other path, and no struct was made for this one
         return incision.cut_area - before
 
     def settle(self, floor: float | None) -> int:

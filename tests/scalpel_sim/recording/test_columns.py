@@ -16,7 +16,7 @@ from scalpel_sim.recording.columns import (
 )
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.recording.row_writer import RowWriter
-from tissue import BladeSegment, RigidContacts, Wrench
+from tissue import BladeSegment, Energies, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FRAMES = {
@@ -26,7 +26,7 @@ FRAMES = {
 AXES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-def result_of(rng, n):
+def result_of(rng, n, energies=None):
     """Return what a row takes of a step with `n` contacts."""
     normal = rng.normal(size=(n, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -47,7 +47,8 @@ def result_of(rng, n):
         n_tetrahedra=3,
         anchored_length=4.0,
         work_of_blade=5.0,
-        energies=None,
+        energies=energies,
+        account=None if energies is None else np.array((*energies, energies.residual)),
     )
 
 
@@ -77,12 +78,14 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
 
 
 @pytest.mark.kernel
+@pytest.mark.parametrize("is_audited", [True, False])
 @pytest.mark.parametrize("n", [0, 1, 40])
-def test_a_row_that_a_kernel_writes_is_the_same(n):
+def test_a_row_that_a_kernel_writes_is_the_same(n, is_audited):
     rng, groups = np.random.default_rng(n), [*COLUMNS.values()]
     blade = BladeSegment(*np.linalg.qr(rng.normal(size=(3, 3)))[0])
     felt, raw = (Wrench(*rng.normal(size=(3, 3))) for _ in range(2))
-    parts = 0.5, blade, felt, raw, result_of(rng, n), FRAMES["parallel"]
+    energies = Energies(*rng.normal(size=14)) if is_audited else None
+    parts = 0.5, blade, felt, raw, result_of(rng, n, energies), FRAMES["parallel"]
     recordings = Recording(), Recording()
     for recording, is_parallel in zip(recordings, (True, False), strict=True):
         writer = RowWriter(groups, recording, is_parallel)

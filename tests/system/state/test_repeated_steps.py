@@ -163,11 +163,11 @@ def test_nodes_that_move_faster_than_their_energy_allows_are_found():
 
 def test_a_node_that_leaves_the_box_faster_than_nodes_move_is_named():
     tissue = in_mid_cut()
-    watch, context = tissue._steps.watch, tissue._model.context
-    watch.look(context)
-    assert watch.fault(context, strokes.DT, 0.0, 0.0, 0.0) is None
+    watch, frame = tissue._steps.watch, tissue._stages.frame_now()
+    watch.look(tissue._stages.context)
+    assert watch.fault(frame, strokes.DT) is None
     tissue._body.positions[5, 0] = TOP[0] + 1.0
-    found = watch.fault(context, strokes.DT, 0.0, 0.0, 0.0)
+    found = watch.fault(frame, strokes.DT)
     assert re.match(r"a node went 1 m out of the box around the body", found)
 
 

@@ -21,6 +21,7 @@ _NUMBERS = ("gap", "mobility", "slop")
 
 _VECTORS = (
     "weight",
+    "response",
     "force",
     "reaction",
     "pressed",
@@ -125,6 +126,9 @@ class GeomContacts(Arrays):
     mobility: FloatArray
     """Velocity of the point per impulse [1/kg], 0 where it may touch nothing in the next
     substep or all its nodes are fixed; shape (2 * capacity,)."""
+    response: FloatArray
+    """Weight of each node over its mass, 0 for a fixed one [1/kg], where `mobility` was noted since
+    masses changed; shape (2 * capacity, 3)."""
     slop: FloatArray
     """Depth of the point up to which it is not pushed out [m], shape (2 * capacity,)."""
     velocity: FloatArray

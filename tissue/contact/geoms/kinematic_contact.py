@@ -97,7 +97,7 @@ def _locate(contacts: GeomContacts, body: Body, c: int, seconds: float, dt: floa
     relative = axpy(-1.0 / dt, motion, weighted(contacts, c, body.velocities))
     # Twice the path: contacts nearby may push the point there.
     if dot(force, force) > 0.0 or contacts.gap[c] <= 2.0 * seconds * norm(relative):
-        contacts.mobility[c] = mobility_at(contacts, body, c)
+        note_mobility(contacts, body, c)
 
 
 @kernel
@@ -164,7 +164,7 @@ def _correct_impulse(contacts: GeomContacts, body: Body, c: int, seconds: float,
     store(contacts.force, c, now)
     change = scale(seconds, sub(now, before))
     push(contacts, c, change, x, axpy(0.5 * mobility, change, v), dt)
-    add_to_nodes(contacts, body, c, change, body.velocities)
+    add_to_nodes(contacts, c, change, body.velocities)
 
 
 @kernel
@@ -212,9 +212,9 @@ def _move(contacts: GeomContacts, body: Body, c: int, by: Vec3) -> None:
     The work is counted with the forces before. `_correct_work` adds that of the forces after.
     """
     for q in range(n_corners(contacts, c)):
-        node, weight = contacts.node[c, q], contacts.weight[c, q]
-        if weight != 0.0 and not body.fixed[node]:
-            shift = scale(weight / body.masses[node], by)
+        node, response = contacts.node[c, q], contacts.response[c, q]
+        if response != 0.0:
+            shift = scale(response, by)
             store(body.positions, node, add(vec3(body.positions, node), shift))
             store(contacts.displacement, node, add(vec3(contacts.displacement, node), shift))
             work = dot(vec3(contacts.resistance, node), shift)
@@ -234,34 +234,33 @@ def weighted(contacts: GeomContacts, c: int, values: FloatArray) -> Vec3:
 
 
 @kernel
-def mobility_at(contacts: GeomContacts, body: Body, c: int) -> float:
-    """Return by how much an impulse changes the velocity of the point of contact `c` [1/kg]."""
+def note_mobility(contacts: GeomContacts, body: Body, c: int) -> None:
+    """Write by how much an impulse changes the velocities of contact `c` and its nodes [1/kg]."""
     total = 0.0
     for q in range(n_corners(contacts, c)):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
+        contacts.response[c, q] = 0.0
         if not body.fixed[node]:
             total += weight * weight / body.masses[node]
-    return total
+            contacts.response[c, q] = weight / body.masses[node]
+    contacts.mobility[c] = total
 
 
 @kernel
-def add_to_nodes(
-    contacts: GeomContacts, body: Body, c: int, change: Vec3, values: FloatArray
-) -> None:
+def add_to_nodes(contacts: GeomContacts, c: int, change: Vec3, values: FloatArray) -> None:
     """Add what a change at the point of contact `c` does to its nodes, by weight and by mass.
 
     Args:
-        contacts: Nodes and weights.
-        body: Masses; fixed nodes stay as they are.
+        contacts: Nodes, and how they respond; fixed nodes stay as they are.
         c: The contact.
         change: An impulse [N s], where `values` are velocities; a force [N], where they are
             accelerations.
         values: Written, shape (n_nodes, 3).
     """
     for q in range(n_corners(contacts, c)):
-        node, weight = contacts.node[c, q], contacts.weight[c, q]
-        if weight != 0.0 and not body.fixed[node]:
-            store(values, node, axpy(weight / body.masses[node], change, vec3(values, node)))
+        node, response = contacts.node[c, q], contacts.response[c, q]
+        if response != 0.0:
+            store(values, node, axpy(response, change, vec3(values, node)))
 
 
 @kernel
