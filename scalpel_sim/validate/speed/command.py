@@ -58,7 +58,7 @@ def _bench_scenes(
     """Run whole scenes: time of a frame, and of each of its stages.
 
     Args:
-        names: organ, incision, slab, grid2, grid7; without a name all of them.
+        names: Scenes that come with the project; without a name all of them.
     """
     from scalpel_sim.validate.speed.scenes import checked_scene_names, measure_scenes
 
@@ -98,7 +98,7 @@ def run_benchmark(
     """
     from scalpel_sim.output.export import check_file
     from scalpel_sim.runs.prepared_run import load_kernels
-    from scalpel_sim.validate.speed.machine import load_average
+    from scalpel_sim.validate.speed.machine import clock_under_load, load_average
     from scalpel_sim.validate.speed.measurements import (
         BenchmarkResult,
         collect_results,
@@ -116,8 +116,9 @@ def run_benchmark(
     with log_to_stderr(printing), watching(printing) as watch:
         load_kernels(printing)
         measured = measure(watch)
+        clock = clock_under_load()
     found = [measured] if isinstance(measured, BenchmarkResult) else measured
-    results = collect_results(found, load_at_start)
+    results = collect_results(found, load_at_start, clock)
     text = results_as_json(results)
     if options.save is not None:
         save_results(options.save, text)
@@ -134,11 +135,13 @@ def _print(
     """Print the results, and their comparison with those of another run."""
     from rich.console import Console
 
+    from scalpel_sim.validate.speed.machine import machine_line
     from scalpel_sim.validate.speed.tables import is_busy, print_comparison
 
     console = Console()
     for each in found:
         each.show(console)
+    console.print(f"Measured on: {machine_line(results.machine)}.", style="dim")
     if is_busy(results):
         console.print(
             f"The machine was busy: load {results.load:.1f} at the start. Wall times are too long, "

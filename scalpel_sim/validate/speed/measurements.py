@@ -154,15 +154,18 @@ def summarise_values(quantity: Quantity, values: Sequence[float]) -> Measurement
     )
 
 
-def collect_results(found: Sequence[BenchmarkResult], load: float) -> SavedResults:
+def collect_results(
+    found: Sequence[BenchmarkResult], load: float, clock: float | None = None
+) -> SavedResults:
     """Return the results of all benchmarks with machine and versions.
 
     Args:
         found: Results of the benchmarks.
         load: Load of the machine at the start.
+        clock: Clock of the core under load [Hz], where it was measured.
     """
     return SavedResults(
-        machine=describe_machine(),
+        machine=describe_machine() | {"clock_hz": clock},
         versions=versions(),
         load=load,
         measurements=[measurement for each in found for measurement in each.measurements],

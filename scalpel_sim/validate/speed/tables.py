@@ -279,11 +279,18 @@ def _changed_circumstances(before: SavedResults, now: SavedResults) -> list[str]
         changed = [
             f"{name} was {old.get(name)}, is {value}"
             for name, value in new.items()
-            if old.get(name) != value
+            if not _is_same(old.get(name), value)
         ]
         if changed:
             lines.append(f"{title}: {'; '.join(changed)}.")
     return lines
+
+
+def _is_same(before: object, now: object) -> bool:
+    """Return whether a fact is the same; a measured clock varies by as much as other figures."""
+    if isinstance(before, float) and isinstance(now, float):
+        return abs(now - before) <= DRIFT * before
+    return before == now
 
 
 def _without_partner(before: SavedResults, now: SavedResults) -> list[str]:

@@ -51,9 +51,12 @@ def test_a_run_is_saved_and_compared_with_itself(capsys, tmp_path):
     words = ["bench", "scenes", "grid2", "--runs", "1"]
     assert command_line([*words, "--json", "--save", str(file)]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(file.read_text())
+    machine = load_results(file).machine
+    assert machine["clock_hz"] > 0.0
     assert command_line([*words, "--compare", str(file)]) == 0
     out = capsys.readouterr().out
     assert "Ratio: above 1 is faster now" in out and "real-time" in out
+    assert f"Measured on: {machine['processor']}" in out and "GHz under load" in out
     assert {each.better for each in load_results(file).measurements} <= {LOWER, HIGHER, NEITHER}
 
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from rich.console import Console
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.validate.speed.measurements import (
@@ -28,6 +29,7 @@ from scalpel_sim.validate.speed.tables import (
     SLOWER,
     TOO_FEW,
     compare_measurements,
+    print_comparison,
 )
 
 
@@ -100,6 +102,14 @@ def test_only_the_same_case_in_the_same_body_is_compared():
     assert (
         compare_measurements([replace(measured([[1.0]]), tetrahedra=48)], [measured([[1.0]])]) == []
     )
+
+
+@pytest.mark.parametrize(("clock", "differs"), [(4.1e9, False), (3.0e9, True)])
+def test_a_clock_differs_where_it_does_by_more_than_measurements_do(clock, differs, capsys):
+    result = BenchmarkResult([run(1e-6)], [], print)
+    before, now = (collect_results([result], 0.0, each) for each in (4e9, clock))
+    print_comparison(before, now, Console(width=1000))
+    assert ("The machine differs: clock_hz was" in capsys.readouterr().out) == differs
 
 
 @pytest.mark.parametrize(
