@@ -65,6 +65,10 @@ _TOUGHNESS = 5.0
 
 LAW_NAMES: dict[str, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
 """The laws that are measured, and their names in the tables."""
+PRECISION_OF_LAW: dict[str, str] = {"springs": "double", "neo_hookean": "single"}
+"""Precision of the forces under each law, as `run` takes it: springs have no other."""
+N_STAGES = 3
+"""Stages of a Runge-Kutta-Nystroem step, each with an evaluation of the forces."""
 
 
 def jittered_block(n_tetrahedra: int) -> TetrahedralMesh:

@@ -19,6 +19,8 @@ from benchmarks.engine import (
     CELL,
     FRAME_DT,
     LAW_NAMES,
+    N_STAGES,
+    PRECISION_OF_LAW,
     BlockCells,
     EngineLoops,
     TouchingBlocks,
@@ -84,10 +86,13 @@ _ABOUT = (
     "time. A step of the whole body costs the same per tetrahedron until the body outgrows a cache."
 )
 _ABOUT_KERNELS = (
-    "ns/tet: ns per tetrahedron. Blocks of jittered cells of 10 mm, held on four sides; one "
-    "thread. CPU: CPU time. Forces: one evaluation, dampers included. A Runge-Kutta step evaluates "
-    "forces three times and dampers four times. The time step includes everything that is done in "
-    "1 ms without a blade."
+    "ns/tet: ns per tetrahedron. Single, double: precision of the forces, as `run` takes it under "
+    "the law. Evaluation and stage: a third of a Runge-Kutta-Nystroem step, without dampers. "
+    "Damped: with dampers along the edges; a whole step evaluates forces three times and dampers "
+    "four times. Evaluation alone: forces and accelerations in one call, without the stage that "
+    "would use them at once. The time step is all that is done in 1 ms without a blade: next to "
+    "nothing once the block rests. Blocks of jittered cells of 10 mm, held on four sides; one "
+    "thread. CPU: CPU time."
 )
 _ABOUT_LOCAL = (
     "Whole frames of 1 ms: detection, cut, relaxation, the force on the blade, and the work of "
@@ -157,30 +162,36 @@ def kernels(
 ) -> BenchmarkResult:
     """Time forces, steps, a cut step and contact detection in 576 to 60,000 tetrahedra."""
     sizes = sizes_up_to(_KERNEL_SIZES, largest)
-    cases: list[Case] = []
-    for size in sizes:
-        for law, law_name in LAW_NAMES.items():
-            loops = EngineLoops(jittered_block(size), law)
-            cases += [
-                Case(f"{law_name}: forces", loops.forces, size),
-                Case(f"{law_name}: Runge-Kutta step", loops.runge_kutta_steps, size),
-                Case(f"{law_name}: time step of 1 ms", loops.frames, size),
-            ]
-    n_of_laws = len(cases)
+    timed = [each for size in sizes for law in LAW_NAMES for each in _loops_of_law(size, law)]
     touching_size = min(_TOUCHING_SIZE, sizes[-1])
     touching = TouchingBlocks(touching_size)
-    cases += [
+    cases = [case for case, _ in timed] + [
         Case("contact: new search", touching.new_searches, 2 * touching_size),
         Case("contact: search", touching.searches, 2 * touching_size),
         Case("contact: forces of a step", touching.forces, 2 * touching_size),
     ]
     rows = Rows("kernels", CPU)
     taken = time_in_turns(cases, runs, clock=CPU, watch=watch)
-    for i, (case, rounds) in enumerate(zip(cases, taken, strict=True)):
-        unit, per = ("ns/tet", case.size) if i < n_of_laws else ("µs", None)
-        rows.times(case.name, case.size, rounds, unit, per=per or 1.0)
+    for (case, per), rounds in zip(timed, taken, strict=False):
+        rows.times(case.name, case.size, rounds, "ns/tet", per=per)
+    for case, rounds in zip(cases[len(timed) :], taken[len(timed) :], strict=True):
+        rows.times(case.name, case.size, rounds, "µs")
     rows.measured += cut(runs=runs, watch=watch, largest=SMALLEST_CUT).measurements
     return rows.table("kernels", _ABOUT_KERNELS)
+
+
+def _loops_of_law(size: int, law: str) -> list[tuple[Case, float]]:
+    """Return the loops of a law in the precision of `run`, and by what their times are divided."""
+    mesh, precision = jittered_block(size), PRECISION_OF_LAW[law]
+    plain = EngineLoops(mesh, law, is_damped=False, precision=precision)
+    damped = EngineLoops(mesh, law, precision=precision)
+    name = f"{LAW_NAMES[law]}, {precision}"
+    return [
+        (Case(f"{name}: evaluation and stage", plain.runge_kutta_steps, size), N_STAGES * size),
+        (Case(f"{name}: evaluation alone, damped", damped.forces, size), size),
+        (Case(f"{name}: whole step, damped", damped.runge_kutta_steps, size), size),
+        (Case(f"{name}: time step of 1 ms", damped.frames, size), size),
+    ]
 
 
 def cut(*, runs: Rounds = 5, watch: TurnWatch = SILENT, largest: Largest = None) -> BenchmarkResult:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
+from benchmarks.engine import PRECISION_OF_LAW, EngineLoops, jittered_block
 from benchmarks.frame import Stopwatches, Trace, trace_frame
 from benchmarks.scaling import (
     RELAXATION_NAME,
@@ -16,6 +17,7 @@ from benchmarks.scaling import (
     measure_local_frames,
     measure_steps,
 )
+from scalpel_sim.scene.read import SCENES
 from tests.support.measured import is_sane, printed
 
 
@@ -41,13 +43,23 @@ def test_each_loop_is_timed_for_each_law_and_size_and_contact_between_two_blocks
     found = kernels(runs=1, largest=5_400)
     assert all(map(is_sane, found.measurements))
     cases = {(each.case, each.tetrahedra) for each in found.measurements}
-    loops = ("forces", "Runge-Kutta step", "time step of 1 ms")
-    for law in ("springs", "neo-Hookean"):
+    loops = (
+        *("evaluation and stage", "evaluation alone, damped"),
+        *("whole step, damped", "time step of 1 ms"),
+    )
+    for law in ("springs, double", "neo-Hookean, single"):
         assert {(f"{law}: {loop}", size) for loop in loops for size in (576, 5_400)} < cases
     for loop in ("new search", "search", "forces of a step"):
         assert (f"contact: {loop}", 10_800) in cases
     text = printed(found, capsys)
     assert "ns/tet" in text and "CPU" in text and "wall" in text and "p99" in text
+
+
+def test_loops_are_timed_in_the_precision_in_which_run_does_them():
+    precision = PRECISION_OF_LAW["neo_hookean"]
+    assert precision == SCENES["organ"].solver.precision == "single"
+    loops = EngineLoops(jittered_block(576), "neo_hookean", precision=precision)
+    assert loops._tissue._model.elasticity.is_single
 
 
 def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
