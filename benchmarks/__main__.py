@@ -13,6 +13,7 @@ from benchmarks.mesh_study import mesh_study
 from benchmarks.peers.benchmark import peers
 from benchmarks.real_time import real_time
 from benchmarks.scaling import cut, kernels, scaling
+from benchmarks.scene_costs import measure_scene_costs
 from benchmarks.strokes import random_strokes
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, exit_code, one_line
@@ -41,6 +42,7 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "scaling": scaling,
     "cut": cut,
     "real-time": real_time,
+    "scene-costs": measure_scene_costs,
     "random-strokes": random_strokes,
     "frame": frame,
     "fixed-cost": fixed_cost,

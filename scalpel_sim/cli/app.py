@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
+from scalpel_sim.cli.doctor_command import doctor
 from scalpel_sim.cli.explain_command import explain
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
@@ -219,6 +220,7 @@ def _key(file: Path, /, *, printing: PrintOptions = PrintOptions()) -> None:
 
 
 app.command(warm_up, name="warm-up")
+app.command(doctor)
 app.command(bench)
 app.command(figure)
 app.command(new)
