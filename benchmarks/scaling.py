@@ -81,9 +81,14 @@ BYTES_PER_TETRAHEDRON = 2_000
 SHARE_OF_MEMORY = 0.6
 """Share of the free memory that all bodies together may take: other programs need some too."""
 
+_WHOLE_STEP = "whole step, damped"
+"""Name of a Runge-Kutta-Nystroem step of three evaluations and stages, with dampers."""
+
 _ABOUT = (
-    "Blocks of jittered cells of 10 mm, held on four sides; one thread; sizes take turns. CPU: CPU "
-    "time. A step of the whole body costs the same per tetrahedron until the body outgrows a cache."
+    "A whole step evaluates forces three times and dampers four times. Single, double: precision "
+    "of the forces. Blocks of jittered cells of 10 mm, held on four sides; one thread; sizes take "
+    "turns. CPU: CPU time. A step of the whole body costs the same per tetrahedron until the body "
+    "outgrows a cache."
 )
 _ABOUT_KERNELS = (
     "ns/tet: ns per tetrahedron. Single, double: precision of the forces, as `run` takes it under "
@@ -189,7 +194,7 @@ def _loops_of_law(size: int, law: str) -> list[tuple[Case, float]]:
     return [
         (Case(f"{name}: evaluation and stage", plain.runge_kutta_steps, size), N_STAGES * size),
         (Case(f"{name}: evaluation alone, damped", damped.forces, size), size),
-        (Case(f"{name}: whole step, damped", damped.runge_kutta_steps, size), size),
+        (Case(f"{name}: {_WHOLE_STEP}", damped.runge_kutta_steps, size), size),
         (Case(f"{name}: time step of 1 ms", damped.frames, size), size),
     ]
 
@@ -282,17 +287,18 @@ def _cut_slit(slit: Slit, tissue: Tissue, cells: BlockCells, *, is_whole: bool) 
 
 
 def measure_steps(n_rounds: int, sizes: Sequence[int], watch: Watch = SILENT) -> BenchmarkResult:
-    """Time a Runge-Kutta step at each size, under each law."""
+    """Time a Runge-Kutta step at each size, under each law, in the precision of `run`."""
     rows = Rows("scaling", CPU)
-    cases = [
-        Case(f"{name}: Runge-Kutta step", EngineLoops(jittered_block(n), law).runge_kutta_steps, n)
-        for n in sizes_that_fit(sizes, memory_bytes(), rows, len(LAW_NAMES))
-        for law, name in LAW_NAMES.items()
-    ]
+    cases: list[Case] = []
+    for n in sizes_that_fit(sizes, memory_bytes(), rows, len(LAW_NAMES)):
+        for law, name in LAW_NAMES.items():
+            precision = PRECISION_OF_LAW[law]
+            loops = EngineLoops(jittered_block(n), law, precision=precision)
+            cases.append(Case(f"{name}, {precision}: {_WHOLE_STEP}", loops.runge_kutta_steps, n))
     taken = time_in_turns(cases, n_rounds, clock=CPU, watch=watch)
-    for (name, _, n), rounds in zip(cases, taken, strict=True):
-        rows.times(name, n, rounds, "ns/tet", per=n or 1.0, quantity="time per tetrahedron")
-        rows.times(name, n, rounds)
+    for (name, _, size), rounds in zip(cases, taken, strict=True):
+        rows.times(name, size, rounds, "ns/tet", per=size or 1.0, quantity="time per tetrahedron")
+        rows.times(name, size, rounds)
     rows.measured.sort(key=lambda each: (each.case, each.unit, each.tetrahedra))
     return rows.table("scaling", _ABOUT)
 

@@ -68,8 +68,8 @@ def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
     by_case = {
         (each.case, each.quantity, each.tetrahedra): each.median for each in found.measurements
     }
-    for law in ("springs", "neo-Hookean"):
-        step = f"{law}: Runge-Kutta step"
+    for law in ("springs, double", "neo-Hookean, single"):
+        step = f"{law}: whole step, damped"
         for size in (576, 6_000):
             each, whole = by_case[step, "time per tetrahedron", size], by_case[step, "time", size]
             assert each == pytest.approx(1e6 * whole / size)
