@@ -240,15 +240,15 @@ def _facts(health: Health) -> list[tuple[str, str]]:
     ]
     if machine := health.machine:
         from scalpel_sim.validate.speed.machine import machine_line
+        from scalpel_sim.validate.speed.tables import BUSY
 
-        found += [
-            ("processor", machine_line(machine)),
-            (
-                "cores",
-                f"{machine['usable_cores']:g} for this process; in the last minute "
-                f"{machine['load']:.1f} programs ran on the machine",
-            ),
-        ]
+        cores = (
+            f"{machine['usable_cores']:g} for this process; in the last minute "
+            f"{machine['load']:.1f} programs ran on the machine"
+        )
+        if machine["load"] > BUSY:
+            cores += ". They share caches and cores with this one: a quiet machine is faster"
+        found += [("processor", machine_line(machine)), ("cores", cores)]
     if kernels := health.kernels:
         n, left = kernels["kernels"], kernels["not_compiled_for"]
         size = f"{n} compiled, {kernels['bytes'] / _BYTES_PER_MB:.1f} MB, in {kernels['folder']}"

@@ -83,6 +83,13 @@ def test_a_factor_has_the_digits_that_are_known(capsys):
     assert text.splitlines()[-1].split() == ["a", "0.35", "b", "3.5", "c", "35"]
 
 
+def test_on_a_busy_machine_it_says_that_a_quiet_one_is_faster(capsys):
+    busy = HEALTHY._replace(machine=HEALTHY.machine | {"load": 3.0})
+    assert "3.0 programs" in text_of(busy, capsys, 200)
+    assert "a quiet machine is faster" in text_of(busy, capsys, 200)
+    assert "a quiet machine is faster" not in text_of(HEALTHY, capsys, 200)
+
+
 def test_with_an_empty_cache_nothing_is_compiled_and_it_says_how_to(capsys, monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     found, code = examined(capsys)
