@@ -22,10 +22,13 @@ def main() -> None:
     # What is loaded lives as long as the process: to look for cycles in it took 0.13 s of a start.
     # `load_kernels` enables the collector again.
     gc.disable()
-    from scalpel_sim.cli.app import command_line
-
     try:
+        from scalpel_sim.cli.app import command_line
+
         code = command_line(sys.argv[1:])
+    except ModuleNotFoundError as error:  # of the command line: not even `doctor` can be asked
+        print(f"error: {error}; install scalpel-sim with all it needs", file=sys.stderr)
+        code = EXIT_RUN_FAILED
     except KeyboardInterrupt as error:  # one more signal, while the first was reported
         print(f"error: {error}", file=sys.stderr)
         code = EXIT_RUN_FAILED

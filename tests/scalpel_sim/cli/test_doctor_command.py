@@ -2,6 +2,8 @@
 
 import importlib.metadata
 import json
+import subprocess
+import sys
 
 import pytest
 from rich.console import Console
@@ -126,6 +128,15 @@ def test_a_package_that_is_needed_and_not_there_fails_with_what_to_install(capsy
     out, err = capsys.readouterr()
     assert "mujoco is not installed" in " ".join(out.split())
     assert err.startswith("error: mujoco is not installed") and 'pip install "mujoco' in err
+
+
+@pytest.mark.parametrize("module", ["fcl", "mujoco"])
+def test_a_module_without_which_no_command_loads_is_named_in_one_line(module):
+    code = f"import sys; sys.modules[{module!r}] = None; import scalpel_sim.__main__ as m; m.main()"
+    ended = subprocess.run([sys.executable, "-c", code, "doctor"], capture_output=True, text=True)
+    assert ended.returncode == EXIT_RUN_FAILED and ended.stdout == ""
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith(f"error: import of {module}") and "install scalpel-sim" in line
 
 
 def test_what_is_missing_is_printed_with_its_cost(capsys):
