@@ -209,7 +209,7 @@ def test_the_account_of_a_body_that_swings_closes():
         gravity=NO_GRAVITY,
         solver=SolverSettings(audit=True),
     )
-    at_first, before = tissue._stages.audit._at_first[0], 0.0
+    at_first, before = tissue._stages.audit.account.at_first[0], 0.0
     for _ in range(3000):
         now = tissue.step(None, 1e-4).energies
         assert now.damping > before
@@ -229,7 +229,7 @@ def test_the_account_tells_what_maxwell_elements_dissipate():
         gravity=NO_GRAVITY,
         solver=SolverSettings(audit=True),
     )
-    stored, before = tissue._stages.audit._at_first[0], 0.0
+    stored, before = tissue._stages.audit.account.at_first[0], 0.0
     for _ in range(100):
         now = tissue.step(None, 0.1).energies
         assert now.damping > before
@@ -256,7 +256,7 @@ def test_a_body_pressed_flat_and_let_go_comes_to_rest():
     )
     tissue._model.relax_stress(math.inf)
     tissue._stages.audit.begin(tissue._model.context, NOWHERE)
-    at_first = tissue._stages.audit._at_first[0]
+    at_first = tissue._stages.audit.account.at_first[0]
     for _ in range(500):
         energies = tissue.step(None, 1e-3).energies
     assert abs(energies.residual) < 0.01 * at_first
