@@ -38,13 +38,13 @@ class Lack(NamedTuple):
 
     what: str
     cost: str
-    """What it costs, and what to do about it."""
+    """Its cost, and the remedy."""
     is_needed: bool = False
     """Whether nothing runs without it."""
 
 
 class Health(NamedTuple):
-    """What is there, and how fast it is. A part is empty where what it needs is not installed."""
+    """Parts of a machine, and its speed. A part is empty where what it needs is not installed."""
 
     versions: dict[str, str | None]
     """Of the program, Python, and the packages that it needs; None: not installed."""

@@ -35,7 +35,7 @@ _NO_ACCOUNT = np.zeros(0)
 
 
 class _OfResult(NamedTuple):
-    """What a row has of the result of a step."""
+    """Numbers of a row that come from the result of a step."""
 
     normal: FloatArray
     normal_force: FloatArray

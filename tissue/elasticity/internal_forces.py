@@ -56,7 +56,7 @@ class Elastic(Arrays, two_precisions=True):
     touching: IntArray = sized("nodes")
     """These nodes, shape (nodes,)."""
     of_contact: FloatArray = sized("nodes")
-    """What contact adds to w^2 of each node [1/s2], shape (nodes,); 0 where nothing touches it."""
+    """Part of contact in w^2 of each node [1/s2], shape (nodes,); 0 where nothing touches it."""
 
 
 class Surroundings(Arrays):

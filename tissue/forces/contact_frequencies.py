@@ -1,4 +1,4 @@
-"""What contact adds to the frequency of each node that it touches.
+"""Contribution of contact to the frequency of each node that it touches.
 
 The springs of contacts add at most W_i^2 to w^2 of node i (`tissue.contact.response.stiffness`),
 and the body has at most b_i there (`tissue.elasticity.frequency.at_rest`): both bound the energy by
@@ -20,7 +20,7 @@ from tissue.forces.step_context import StepContext
 def frequency_of_contacts(context: StepContext, search: SearchState, limits: Limits) -> float:
     """Return what contacts add to w^2 of the body where that of its nodes is not known [1/s2].
 
-    Where tetrahedra resist deformation it is written for each node, and is 0.
+    Where nodes in contact may get mass it is written for each node, and 0 is returned.
 
     Args:
         context: Body, contacts and bounds; written where contacts are new.

@@ -40,14 +40,14 @@ class StepChoice(Arrays):
     span: FloatCell
     """Length of the increment [s]."""
     of_contact: FloatCell
-    """What contact and attachments add to w^2 of every node at most [1/s2]; written before an
+    """Largest part of contact and attachments in w^2 of every node [1/s2]; written before an
     increment begins. Contact of tetrahedra is in the bounds of their nodes instead."""
     room: FloatCell
-    """What contact may add to w^2 of the body without another step [1/s2]."""
+    """Room for contact in w^2 of the body without another step [1/s2]."""
     least: FloatCell
     """Bound on w^2 with the body at rest, the blade and contact [1/s2]."""
     added: FloatCell
-    """What contact adds to w^2, and the blade where tissue stiffens [1/s2]."""
+    """Part of contact in w^2, and of the blade where tissue stiffens [1/s2]."""
     needed: FloatCell
     """Steps that the motion needs in the rest of the increment."""
     at_rest: FloatCell
