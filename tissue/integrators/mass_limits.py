@@ -23,14 +23,16 @@ def limit_mass(choice: StepChoice, context: StepContext) -> None:
     """Set the limit above which nodes get mass between cuts; they give it back where it is used up.
 
     Where one step suffices for the increment without it, they get none. Where what was given back
-    is used up again soon, they may take another step.
+    is used up again soon, tissue that stiffens may take another step; other tissue keeps what it
+    has, as it would only lose momentum.
     """
     elastic, scaling, solid = context.elastic, context.elastic.scaling, context.elastic.solid
     scaling.increments += 1
     if scaling.is_used_up == 1:
         scaling.is_used_up = 0
-        if scaling.between_cuts >= _LEAST_RETURNED * scaling.most:
-            if scaling.increments < _SOON:
+        is_soon, may_step = scaling.increments < _SOON, stiffens(solid.law)
+        if scaling.between_cuts >= _LEAST_RETURNED * scaling.most and (may_step or not is_soon):
+            if is_soon:
                 scaling.steps = max(scaling.steps, choice.last_steps) + 1
             return_all_mass(elastic, context.body, solid.every)
     limit_touching(elastic, context.body)

@@ -53,7 +53,7 @@ class _Amounts(NamedTuple):
 
 
 class MeshChanges(NamedTuple):
-    """What changes of the mesh added to each energy [J]. No time passes in them.
+    """Change of each energy by changes of the mesh [J]. No time passes in them.
 
     Tests bound each in sign and size (`tests/system/energy/test_energy_account.py`).
     """
@@ -97,7 +97,7 @@ class Account(Arrays):
     at_first: FloatArray
     """Those when the account began."""
     changes: FloatArray
-    """What changes of the mesh added since then: the numbers of `MeshChanges`."""
+    """Energy that changes of the mesh added since then: the numbers of `MeshChanges`."""
     energies: FloatArray
     """The numbers of `Energies`, and their residual."""
 
@@ -211,7 +211,7 @@ class Audit:
 
     @property
     def changes(self) -> MeshChanges:
-        """What changes of the mesh added since the account began."""
+        """Energy that changes of the mesh added since the account began."""
         return MeshChanges(*self.account.changes.tolist())
 
     def begin(self, context: StepContext, edge: Edge) -> None:

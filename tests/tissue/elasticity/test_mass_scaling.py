@@ -218,6 +218,18 @@ def test_mass_that_is_used_up_is_given_back_and_used_up_again_soon_takes_another
     assert scaling.steps > 0
 
 
+def test_tissue_that_does_not_stiffen_gives_mass_back_no_more_often_than_in_100_increments():
+    tissue = pulled_body(LEAST, [node_inside()])
+    scaling = tissue._model.elasticity.arrays.scaling
+    tissue.step(None, strokes.DT)
+    for increments, is_returned in ((5, False), (100, True)):
+        scaling.most, scaling.is_used_up = scaling.between_cuts, 1
+        scaling.increments = increments
+        tissue.step(None, strokes.DT)
+        assert (scaling.increments <= 1) == is_returned
+    assert scaling.steps == 0
+
+
 def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_back():
     tissue = pulled_body(LEAST, [node_inside()])
     body, elasticity = tissue._body, tissue._model.elasticity
