@@ -87,6 +87,8 @@ class Model(NamedTuple):
     material: Material
     averaged: bool = True
     """Whether dilatation is averaged over nodes, as in the engine."""
+    element: str = "averaged"
+    """How tetrahedra are strained (`SolverSettings.element`)."""
     shape: Callable[..., TetrahedralMesh] = block
     """How cells are divided into tetrahedra."""
 
@@ -98,10 +100,17 @@ def models() -> list[Model]:
     for nu in RATIOS:
         material = Material(10e3, 1000.0, law="neo_hookean", poisson_ratio=nu)
         if nu > 0.0:
-            found.append(Model(f"neo-Hookean, nu {nu}, plain", material, averaged=False))
+            locked = Model(f"neo-Hookean, nu {nu}, volume not averaged", material, averaged=False)
+            found.append(locked)
+        found.append(Model(f"neo-Hookean, nu {nu}, plain", material, element="plain"))
         found.append(Model(f"neo-Hookean, nu {nu}", material))
         if nu in ON_LATTICE:
-            found.append(Model(f"neo-Hookean, nu {nu}, lattice", material, shape=lattice_block))
+            found += [
+                Model(
+                    f"neo-Hookean, nu {nu}, lattice{name}", material, True, element, lattice_block
+                )
+                for name, element in ((", plain", "plain"), ("", "averaged"))
+            ]
     return found
 
 
@@ -128,7 +137,8 @@ class Bar:
         self.is_end = x > self.length * (1.0 - 1e-9)
         self.is_free = np.repeat(x > 1e-9 * self.length, 3)
         self.masses = masses(self.mesh, self.material.density)
-        matrix = stiffness_matrix(self.mesh, self.material, averaged=model.averaged)
+        how = {"averaged": model.averaged, "element": model.element}
+        matrix = stiffness_matrix(self.mesh, self.material, **how)
         self.stiffness = matrix[self.is_free][:, self.is_free].tocsc()
 
     @cached_property

@@ -57,6 +57,7 @@ from .shapes.block import block as block
 from .shapes.block import lattice_block as lattice_block
 from .shapes.cylinder import cylinder as cylinder
 from .shapes.liver_lobe import liver_lobe as liver_lobe
+from .solver_settings import ELEMENTS as ELEMENTS
 from .solver_settings import PRECISIONS as PRECISIONS
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import TissueState as TissueState
@@ -120,6 +121,7 @@ __all__ = [
     "MeshError",
     "MeshMeasures",
     "Piece",
+    "ELEMENTS",
     "PRECISIONS",
     "Preset",
     "RELAXATIONS",

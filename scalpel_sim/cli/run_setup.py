@@ -51,6 +51,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "scheme",
         "relaxation",
         "mass_scaling",
+        "element",
         "precision",
         "threads",
         "blade",

@@ -76,6 +76,7 @@ def make_tissue(scene: Scene) -> Tissue:
             threads=solver.threads,
             audit=solver.audit,
             mass_scaling=solver.mass_scaling or None,
+            element=solver.element,
             precision=solver.precision,
         ),
     )

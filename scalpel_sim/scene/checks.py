@@ -21,7 +21,7 @@ from scalpel_sim.scene.schema import (
     WaypointTable,
     WorldTable,
 )
-from tissue import PRECISIONS, RELAXATIONS, SCHEMES, Material
+from tissue import ELEMENTS, PRECISIONS, RELAXATIONS, SCHEMES, Material
 
 COUPLINGS = ("rigid", "virtual")
 """Names of the couplings between the arm's blade and the one that cuts."""
@@ -72,6 +72,7 @@ def check_solver(solver: SolverTable, material: Material) -> None:
     relaxation, threads = solver.relaxation, solver.threads
     check_choice("scheme", solver.scheme, SCHEMES)
     check_choice("relaxation", relaxation, tuple(RELAXATIONS))
+    check_choice("element", solver.element, ELEMENTS)
     check_choice("precision", solver.precision, PRECISIONS)
     if threads != 1 and relaxation == "hierarchical":
         raise UsageError(

@@ -158,7 +158,9 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "material": self.material.as_keys(),
             "fixed": self.body.fixed,
             "cut": asdict(self.cut),
-            **_values(solver, "scheme", "relaxation", "mass_scaling", "precision", "threads"),
+            **_values(
+                solver, "scheme", "relaxation", "mass_scaling", "element", "precision", "threads"
+            ),
             "stretch": self.body.stretched_by,
             **_values(world, "gravity", "floor", "table", "table_friction"),
             "blade": None if self.blade is None else asdict(self.blade),

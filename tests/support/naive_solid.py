@@ -53,33 +53,70 @@ def slope_of_w(law: EnergyDensity, q: FloatArray) -> FloatArray:
     return 1.0 + 2.0 * law.second * positive + 3.0 * law.third * positive**2
 
 
-def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> float:
-    """Return the elastic energy less that at rest [J]."""
+def averaged_gradients(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
+    """Return F averaged around each node by volume, shape (n_nodes, 3, 3)."""
     v, f = volumes(mesh), gradients(mesh, positions)
+    sums = [around_nodes(mesh, v * f[:, i, j]) for i in range(3) for j in range(3)]
+    return (np.array(sums) / around_nodes(mesh, v)).T.reshape(-1, 3, 3)
+
+
+def shear_energy(law: EnergyDensity, f: FloatArray) -> FloatArray:
+    """Return the shear part of the energy per volume [J/m3], 0 at rest without stress there."""
     squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
     if law.exponent + law.second + law.third > 0.0:
-        shear = 0.5 * law.mu * w(law, squared - 1.0 - 2.0 * j)
-    else:
-        shear = 0.5 * law.mu * (squared - 3.0 - np.log((squared + 1.0) / 4.0))
-    rest = (1.0 - law.a) ** 2
-    total = v @ (shear + 0.5 * law.lam_of_tetrahedra * ((j - law.a) ** 2 - rest))
-    of_nodes = 0.5 * law.lam_of_nodes * ((averaged_j(mesh, positions) - law.a) ** 2 - rest)
-    return float(total + around_nodes(mesh, v) @ of_nodes)
+        return 0.5 * law.mu * w(law, squared - 1.0 - 2.0 * j)
+    return 0.5 * law.mu * (squared - 3.0 - np.log((squared + 1.0) / 4.0) - 1.5 * (j - 1.0))
+
+
+def shear_stress(law: EnergyDensity, f: FloatArray) -> FloatArray:
+    """Return the derivative of `shear_energy` [Pa]."""
+    squared, c = (f**2).sum(axis=(1, 2))[:, None, None], cofactors(f)
+    if law.exponent + law.second + law.third > 0.0:
+        factor = slope_of_w(law, (squared - 1.0 - 2.0 * np.linalg.det(f)[:, None, None]))
+        return law.mu * factor * (f - c)
+    return law.mu * ((1.0 - 1.0 / (squared + 1.0)) * f - 0.75 * c)
+
+
+def cofactors(f: FloatArray) -> FloatArray:
+    """Return the cofactors of matrices that can be inverted."""
+    return np.linalg.det(f)[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
+
+
+def volume_energy(law: EnergyDensity, lam: float, j: FloatArray) -> FloatArray:
+    """Return lam/2 ((J - a)^2 - (1 - a)^2), without the part that is linear in J of the shear."""
+    linear = 0.0 if law.a == 1.0 else lam * (law.a - 1.0) * (j - 1.0)
+    return 0.5 * lam * ((j - law.a) ** 2 - (1.0 - law.a) ** 2) + linear
+
+
+def flat(law: EnergyDensity, j: FloatArray) -> FloatArray:
+    """Return how far J of each tetrahedron is below 0.3, where the shear is averaged."""
+    return np.maximum(0.3 - j, 0.0) * float(law.shear_of_nodes > 0.0)
+
+
+def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> float:
+    """Return the elastic energy less that at rest [J]."""
+    v, f, share = volumes(mesh), gradients(mesh, positions), law.shear_of_nodes
+    j, of_nodes = np.linalg.det(f), averaged_j(mesh, positions)
+    own = (1.0 - share) * shear_energy(law, f) + volume_energy(law, law.lam_of_tetrahedra, j)
+    own = own + 1.5 * law.shear_modulus * flat(law, j) ** 2
+    mean = volume_energy(law, law.lam_of_nodes, of_nodes)
+    if share:
+        mean = mean + share * shear_energy(law, averaged_gradients(mesh, positions))
+    return float(v @ own + around_nodes(mesh, v) @ mean)
 
 
 def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
     """Return the first Piola-Kirchhoff stress of each tetrahedron [Pa], shape (n_tets, 3, 3)."""
-    f = gradients(mesh, positions)
-    squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
-    cofactors = j[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
-    p = law.lam_of_tetrahedra * (j - law.a)
-    p = p + law.lam_of_nodes * (averaged_j(mesh, positions)[mesh.tetrahedra].mean(axis=1) - law.a)
-    if law.exponent + law.second + law.third > 0.0:
-        shear = law.mu * slope_of_w(law, squared - 1.0 - 2.0 * j)
-        p = p - shear
-    else:
-        shear = law.mu * (1.0 - 1.0 / (squared + 1.0))
-    return shear[:, None, None] * f + p[:, None, None] * cofactors
+    f, share = gradients(mesh, positions), law.shear_of_nodes
+    j = np.linalg.det(f)
+    p = law.lam_of_tetrahedra * (j - 1.0) - 3.0 * law.shear_modulus * flat(law, j)
+    of_nodes = law.lam_of_nodes * (averaged_j(mesh, positions) - 1.0)
+    p = p + of_nodes[mesh.tetrahedra].mean(axis=1)
+    total = (1.0 - share) * shear_stress(law, f) + p[:, None, None] * cofactors(f)
+    if share:
+        mean = shear_stress(law, averaged_gradients(mesh, positions))
+        total = total + share * mean[mesh.tetrahedra].mean(axis=1)
+    return total
 
 
 def forces(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:

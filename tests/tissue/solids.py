@@ -20,17 +20,11 @@ from tissue.elasticity.finite_elements import (
     room_for_stars,
 )
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
-from tissue.elasticity.neo_hookean import (
-    displacement_gradients,
-    displacements,
-    has_averaged_volumes,
-    pressures,
-    solid_force,
-    solid_forces,
-)
+from tissue.elasticity.neo_hookean import deform_solid, solid_force, solid_forces
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks
 from tissue.laws.energy_density import (
     EnergyDensity,
+    averaged_shear,
     exponential,
     neo_hookean,
     polynomial,
@@ -63,6 +57,9 @@ LAWS = {
     ),
     "exponential": exponential(*lame(0.45), 12.0),
     "yeoh": polynomial(*lame(0.45), 2.0, 5.0),
+    "averaged shear": averaged_shear(law_of(0.45)),
+    "averaged exponential": averaged_shear(exponential(*lame(0.45), 12.0)),
+    "averaged yeoh": averaged_shear(polynomial(*lame(0.45), 2.0, 5.0)),
 }
 
 
@@ -163,19 +160,14 @@ def highest_frequency(solid: SolidBody, positions: FloatArray | None = None) -> 
 @kernel
 def evaluate(solid: Solid, body: Body, positions: FloatArray, out: FloatArray) -> None:
     """Write the forces on all nodes to `out`."""
-    blocks, n = n_blocks(solid, body.n_tetrahedra), body.n_nodes
-    solid_forces(solid, body, positions, solid.every, blocks, solid.every, n)
-    for i in range(n):
+    solid_forces(solid, body, positions)
+    for i in range(body.n_nodes):
         store_point(out, i, solid_force(solid, i))
 
 
 @kernel
 def relax_where_it_is(solid: Solid, body: Body, seconds: float) -> None:
     """Let the stress of a body relax for that time [s]."""
-    blocks, n = n_blocks(solid, body.n_tetrahedra), body.n_nodes
-    displacements(solid, body, body.positions, solid.every, 0, n)
-    displacement_gradients(solid, solid.every, 0, blocks)
-    if has_averaged_volumes(solid):
-        pressures(solid, solid.every, 0, n)
+    deform_solid(solid, body, body.positions)
     prepare_relaxation(solid, seconds)
-    relax_blocks(solid, 0, blocks)
+    relax_blocks(solid, 0, n_blocks(solid, body.n_tetrahedra))

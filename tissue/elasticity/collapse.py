@@ -22,12 +22,9 @@ from tissue.core.jit import kernel
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
+from tissue.elasticity.averaged_shear import J_LIMIT
 from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
-
-J_LIMIT: Final = 0.3
-"""J below which a tetrahedron resists. Larger: tissue that is merely pressed is no more that of the
-springs; smaller: the term must be stiffer to turn what moves at the same speed."""
 
 J_LISTED: Final = 0.5
 """J below which it is listed, now or by how it moves, as it may come to the limit before the next

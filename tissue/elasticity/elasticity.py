@@ -24,7 +24,7 @@ from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, no_mass_scaling
 from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
-from tissue.laws.energy_density import volume_term
+from tissue.laws.energy_density import averaged_shear, volume_term
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
@@ -49,6 +49,7 @@ class Elasticity:
             shear; None for no added mass. Where the uncut body has a higher one, that: only what a
             cut makes faster gets mass.
         is_single: Whether forces of tetrahedra are computed in single precision.
+        averages_shear: Whether a share of the shear of tetrahedra is averaged around nodes.
         resists_collapse: Whether tetrahedra are kept from turning inside out where springs alone
             are elastic.
     """
@@ -61,6 +62,7 @@ class Elasticity:
         *,
         mass_scaling: float | None = None,
         is_single: bool = False,
+        averages_shear: bool = True,
         resists_collapse: bool = True,
     ) -> None:
         self._density, self._spring_modulus = material.density, material.spring_modulus
@@ -72,6 +74,8 @@ class Elasticity:
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
         law = material.law.density(material.moduli)
+        if law is not None and averages_shear and law.mu > 0.0:
+            law = averaged_shear(law)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self._may_collapse = law is None and resists_collapse
         self.arrays = Elastic.new(

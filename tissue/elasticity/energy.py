@@ -23,18 +23,12 @@ from tissue.core.simd import Lanes, store_point
 from tissue.core.simd_blocks import load_block, logarithm, splat, sum_of_lanes, width_of
 from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot, vec3
+from tissue.elasticity.averaged_shear import flat_modulus, flatness, shear_energy_of_nodes
 from tissue.elasticity.collapse import collapse_energy
-from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, n_blocks
+from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear, n_blocks
+from tissue.elasticity.gradients import known_gradient, shape_of
 from tissue.elasticity.internal_forces import Elastic, Surroundings, viscous_force
-from tissue.elasticity.neo_hookean import (
-    cofactors_of,
-    dilated_around,
-    displacement_gradients,
-    displacements,
-    known_gradient,
-    own_dilatation,
-    shape_of,
-)
+from tissue.elasticity.neo_hookean import NO_VOLUME, deform_solid, dilated_around, own_dilatation
 from tissue.elasticity.relaxed_stress import (
     PRESSURE,
     relaxed_pressure,
@@ -42,6 +36,7 @@ from tissue.elasticity.relaxed_stress import (
     rows_of_stress,
 )
 from tissue.elasticity.springs import spring_energy
+from tissue.elasticity.stress import cofactors_of
 from tissue.laws.kernels import (
     complementary_energy,
     stiffens,
@@ -124,14 +119,15 @@ def dissipated_power(
 def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
     """Return the energy stored in the tetrahedra at `positions` [m], less that at rest [J]."""
     law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
-    displacements(solid, body, positions, solid.every, 0, body.n_nodes)
-    displacement_gradients(solid, solid.every, 0, blocks)
+    deform_solid(solid, body, positions)
     energy = 0.0
     for block in range(blocks):
         energy += sum_of_lanes(_energies(solid, block))
     for node in range(body.n_nodes):
         v = solid.node_volume[node]
         energy += v * _bulk_energy(law.lam_of_nodes, dilated_around(solid, node) / v, law.a)
+    if averages_shear(solid):
+        energy += shear_energy_of_nodes(solid, body.n_nodes)
     if relaxes(solid):
         energy += relaxed_energy(solid, blocks)
     return energy
@@ -219,7 +215,14 @@ def _energies(solid: Solid, block: int) -> Lanes:
     dilatation = load_block(solid.dilated, width * (1 + block))
     ratio = own_dilatation(solid, block, v)
     bulk = dilatation * (ratio + splat(2.0 * (1.0 - law.a), v))
-    return splat(0.5 * law.mu, v) * v * shear + splat(0.5 * law.lam_of_tetrahedra, v) * bulk
+    own = splat(0.5 * law.mu * (1.0 - law.shear_of_nodes), v)
+    energy = own * v * shear + splat(0.5 * law.lam_of_tetrahedra, v) * bulk
+    if averages_shear(solid):
+        flat = flatness(solid, block, v)
+        energy = energy + splat(0.5 * flat_modulus(law), v) * flat * flat / (
+            v + splat(NO_VOLUME, v)
+        )
+    return energy
 
 
 @kernel

@@ -19,7 +19,8 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, filled
-from tissue.core.simd_blocks import row_of_lane, width_of
+from tissue.core.simd_blocks import width_of
+from tissue.core.simd_points import row_of_lane
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
@@ -75,7 +76,7 @@ class Solid(Arrays, two_precisions=True):
     """Place in `dilated` of the tetrahedron of each slot, in order of tetrahedra; shape (pool,)."""
     corner: SlotArray = sized("pool")
     """Row of `forces` with the force on the corner of each slot, shape (pool,)."""
-    node_volume: FloatArray = sized("nodes")
+    node_volume: FloatArray = sized("padded_nodes")
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
     weight: FloatArray = sized("nodes")
     """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency.at_rest`), shape
@@ -86,6 +87,8 @@ class Solid(Arrays, two_precisions=True):
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
     ring: FloatArray = sized(LARGEST_RING, 3)
     """Scratch of `frequency.at_rest`: sums at the nodes of a star, shape (LARGEST_RING, 3)."""
+    rest_ring: FloatArray = sized(LARGEST_RING, 3)
+    """Scratch of `frequency.at_rest`: the same at rest, shape (LARGEST_RING, 3)."""
     ring_nodes: IntArray = sized(LARGEST_RING)
     """Scratch of `frequency.at_rest`: the nodes of a star, shape (LARGEST_RING,)."""
     listed: IntArray = sized("nodes")
@@ -101,6 +104,16 @@ class Solid(Arrays, two_precisions=True):
     gradient: FloatArray = sized((9, "in_blocks_of_singles"), is_for_vectors=True)
     """Scratch, in single precision: H of each tetrahedron, in blocks of nine rows, xx, xy, xz and
     so on."""
+    gradient_rows: FloatArray = sized("averaged_behind_a_block", 16, is_for_vectors=True)
+    """Scratch: V H of tetrahedron t [m3], as xx, xy, xz and so on, and V (J - 1), behind a first
+    block of zeros; empty where no shear is averaged (`tissue.elasticity.averaged_shear`)."""
+    node_gradient: FloatArray = sized("averaging_nodes", 16, is_for_vectors=True)
+    """Scratch: H and J - 1 averaged around each node."""
+    node_stress: FloatArray = sized("averaging_nodes", 16, is_for_vectors=True)
+    """Scratch: the stress and the pressure that these give [Pa]."""
+    node_stiffness: FloatArray = sized("averaging_nodes", is_for_vectors=True)
+    """Scratch, under laws that stiffen: a bound on the stiffness of the shear there over that at
+    rest."""
     dilated: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch: V (J - 1) of tetrahedron t [m3], behind a first block of zeros."""
     growth: FloatArray = sized("behind_a_block", is_for_vectors=True)
@@ -181,24 +194,33 @@ def no_solid(
     real = np.float32 if is_single else np.float64
     terms = np.array(prony, dtype=np.float64).reshape(-1, 2)
     return Solid.new(
-        _sizes(n_nodes, n_tetrahedra, pool, len(terms), is_single),
+        _sizes(law, n_nodes, n_tetrahedra, pool, len(terms), is_single),
         real=real,
         law=law,
         relaxing_shares=terms[:, 0].copy(),
         relaxation_times=terms[:, 1].copy(),
-        every=np.arange(max(n_nodes, n_tetrahedra)),
+        every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH),
         fastest=-1,
     )
 
 
 def _sizes(
-    n_nodes: int, n_tetrahedra: int, pool: int, n_terms: int, is_single: bool
+    law: EnergyDensity,
+    n_nodes: int,
+    n_tetrahedra: int,
+    pool: int,
+    n_terms: int,
+    is_single: bool,
 ) -> dict[str, int]:
     """Return the sizes of the arrays of `Solid` for that much."""
     width = 2 * WIDTH if is_single else WIDTH
     blocks = (n_tetrahedra + width - 1) // width
+    averages = law.shear_of_nodes != 0.0
     return {
         "nodes": n_nodes,
+        "padded_nodes": n_nodes + 2 * WIDTH,
+        "averaging_nodes": n_nodes + 2 * WIDTH if averages else 0,
+        "averaged_behind_a_block": width * (1 + blocks) if averages else 0,
         "pool": pool,
         "terms": n_terms,
         "blocks": blocks,
@@ -214,8 +236,9 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     is_single = solid.shape.dtype == np.float32
     n_terms = len(solid.relaxation_times)
-    larger = solid.grown(_sizes(n_nodes, n_tetrahedra, pool, n_terms, is_single))
-    return larger.replaced(every=np.arange(max(n_nodes, n_tetrahedra)))
+    sizes = _sizes(solid.law, n_nodes, n_tetrahedra, pool, n_terms, is_single)
+    larger = solid.grown(sizes)
+    return larger.replaced(every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH))
 
 
 def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
@@ -252,6 +275,12 @@ def corner_row(solid: Solid, t: int, k: int) -> int:
     width = width_of(solid.shape)
     row: int = width * (4 * (1 + t // width) + k) + row_of_lane(t % width, width)
     return row
+
+
+@inlined
+def averages_shear(solid: Solid) -> bool:
+    """Return whether a share of the shear acts on gradients averaged around nodes."""
+    return solid.law.shear_of_nodes != 0.0
 
 
 @kernel

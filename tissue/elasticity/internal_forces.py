@@ -11,7 +11,7 @@ from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.collapse import Collapsing
-from tissue.elasticity.finite_elements import Solid, n_blocks
+from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.mass_scaling import MassScaling
 from tissue.elasticity.neo_hookean import solid_force, solid_forces
 from tissue.elasticity.springs import (
@@ -74,9 +74,7 @@ class Surroundings(Arrays):
 def deform(elastic: Elastic, body: Body, positions: FloatArray) -> None:
     """Evaluate all tetrahedra at `positions` [m], for `internal_force`."""
     if elastic.has_tetrahedra:
-        solid = elastic.solid
-        blocks, nodes = n_blocks(solid, body.n_tetrahedra), body.n_nodes
-        solid_forces(solid, body, positions, solid.every, blocks, solid.every, nodes)
+        solid_forces(elastic.solid, body, positions)
 
 
 @inlined

@@ -14,32 +14,45 @@ What is not zero at rest cancels, which leaves
 
 every term of which is small where the strain is. The pressure p is that of the tetrahedron, or the
 mean of those at its nodes, where J is averaged over the tetrahedra around the node: the exact
-gradient of the energy either way. Where stress relaxes, F R + r cof F is taken from P
+gradient of the energy either way. Of the other terms a share may be averaged in the same way
+(`tissue.elasticity.averaged_shear`). Where stress relaxes, F R + r cof F is taken from P
 (`tissue.elasticity.relaxed_stress`).
 
-Four loops: displacements of nodes, gradients of blocks, pressures of nodes, forces of blocks; then
+Four loops: displacements of nodes, gradients of blocks, averages of nodes, forces of blocks; then
 the force on a node is the sum over its row. Threads may share a loop, each taking a part of it.
 """
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, Lanes, Point, point, point_of
-from tissue.core.simd_blocks import (
-    load_block,
-    points_of_rows,
-    splat,
-    store_block,
+from tissue.core.simd import WIDTH, Lanes, Point, point_of
+from tissue.core.simd_blocks import load_block, splat, store_block, width_of
+from tissue.core.simd_points import (
     store_everywhere,
-    store_row,
     store_rows,
     sum_of_eight_rows,
     values_of_rows,
-    width_of,
 )
 from tissue.core.simd_rows import natural, sum_of_eight
-from tissue.core.vec3 import Vec3, add, cross, dot, scale
-from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
+from tissue.core.vec3 import Vec3, add, axpy, dot, scale
+from tissue.elasticity.averaged_shear import (
+    average_around_nodes,
+    flat_modulus,
+    flatness,
+    store_gradients,
+    stress_of_nodes,
+)
+from tissue.elasticity.finite_elements import VOLUME, Solid, averages_shear, n_blocks
+from tissue.elasticity.gradients import (
+    displacements,
+    gradient_of_displacement,
+    gradient_of_shape,
+    keep_gradient,
+    keeps_gradients,
+    known_gradient,
+    shape_of,
+)
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
+from tissue.elasticity.stress import MatrixRows, cofactors_of, stress_of
 from tissue.laws.kernels import isotropic_factor, stiffening_factor, stiffens, stretch_invariant
 from tissue.mesh.body import Body
 
@@ -48,35 +61,25 @@ NO_VOLUME = 1e-30
 
 
 @kernel
-def solid_forces(
-    solid: Solid,
-    body: Body,
-    positions: FloatArray,
-    blocks: IntArray,
-    n_blocks: int,
-    nodes: IntArray,
-    n_nodes: int,
-) -> None:
+def solid_forces(solid: Solid, body: Body, positions: FloatArray) -> None:
     """Run all loops, so that `solid_force` gives the force on a node.
-
-    For the forces on some nodes only, `blocks` are those of the tetrahedra around them, and `nodes`
-    the nodes of those tetrahedra. Where volumes are averaged, `solid.dilated` must then be up to
-    date around all of these.
 
     Args:
         solid: Scratch is written.
         body: Rest positions.
         positions: Positions of the nodes [m].
-        blocks: Blocks of tetrahedra.
-        n_blocks: How many of them.
-        nodes: Nodes that the blocks read.
-        n_nodes: How many of them.
     """
-    displacements(solid, body, positions, nodes, 0, n_nodes)
-    displacement_gradients(solid, blocks, 0, n_blocks)
-    if has_averaged_volumes(solid):
-        pressures(solid, nodes, 0, n_nodes)
-    corner_forces(solid, blocks, 0, n_blocks)
+    deform_solid(solid, body, positions)
+    corner_forces(solid, 0, n_blocks(solid, body.n_tetrahedra))
+
+
+@kernel
+def deform_solid(solid: Solid, body: Body, positions: FloatArray) -> None:
+    """Write gradients of the tetrahedra at `positions` [m], and what is averaged around nodes."""
+    displacements(solid, body, positions, 0, body.n_nodes)
+    displacement_gradients(solid, 0, n_blocks(solid, body.n_tetrahedra))
+    if has_averages(solid):
+        average_volumes(solid, 0, body.n_nodes)
 
 
 @inlined
@@ -92,59 +95,57 @@ def solid_force(solid: Solid, node: int) -> Point:
 
 
 @kernel
-def has_averaged_volumes(solid: Solid) -> bool:
-    """Return whether forces need the loop `pressures`."""
+def has_averages(solid: Solid) -> bool:
+    """Return whether forces need the loop `average_volumes`."""
     return solid.law.lam_of_nodes != 0.0
 
 
 @kernel
-def displacements(
-    solid: Solid, body: Body, positions: FloatArray, nodes: IntArray, begin: int, end: int
-) -> None:
-    """Write the displacements of `nodes[begin:end]` from rest to `positions` [m].
+def displacement_gradients(solid: Solid, begin: int, end: int) -> None:
+    """Write H, V (J - 1) and `Solid.stiffening` of the blocks from `begin` to `end`.
 
-    Args:
-        solid: Written.
-        body: Rest positions.
-        positions: Positions of the nodes [m].
-        nodes: The nodes.
-        begin: First of them.
-        end: End of them.
+    After `displacements`.
     """
-    for i in range(begin, end):
-        node = natural(nodes[i])
-        store_row(solid.displacement, node, point(positions, node) - point(body.rest, node))
-
-
-@kernel
-def displacement_gradients(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
-    """Write H, V (J - 1) and `Solid.stiffening` of `blocks[begin:end]`, after `displacements`."""
-    # Two loops, so that the code of each is without a branch.
-    if stiffens(solid.law):
-        for i in range(begin, end):
-            _write_gradient(solid, blocks[i], True)
+    # Loops of their own, so that the code of each is without a branch.
+    if averages_shear(solid):
+        if stiffens(solid.law):
+            for block in range(begin, end):
+                _write_gradient(solid, natural(block), True, True)
+        else:
+            for block in range(begin, end):
+                _write_gradient(solid, natural(block), False, True)
+    elif stiffens(solid.law):
+        for block in range(begin, end):
+            _write_gradient(solid, natural(block), True, False)
     else:
-        for i in range(begin, end):
-            _write_gradient(solid, blocks[i], False)
+        for block in range(begin, end):
+            _write_gradient(solid, natural(block), False, False)
 
 
 @inlined
-def _write_gradient(solid: Solid, block: int, has_stiffened: bool) -> None:
-    """Write what `displacement_gradients` does of a block; `has_stiffened` is a constant there.
+def _write_gradient(solid: Solid, block: int, has_stiffened: bool, is_averaged: bool) -> None:
+    """Write what `displacement_gradients` does of a block.
 
     In `corner_forces` a long chain of operations would wait for the factor of the shear: for a
     division, or an exponential.
+
+    Args:
+        solid: Written.
+        block: The block.
+        has_stiffened: Whether the law stiffens; a constant where this is called.
+        is_averaged: Whether a share of the shear is averaged around nodes; a constant, too.
     """
     law, width = solid.law, width_of(solid.shape)
     x, y, z = gradient_of_displacement(solid, block)
     if keeps_gradients(solid):
-        at = 9 * width * block
-        _store_vector(solid, at, x)
-        _store_vector(solid, at + 3 * width, y)
-        _store_vector(solid, at + 6 * width, z)
+        keep_gradient(solid, block, (x, y, z))
     cofactors = cofactors_of(x, y, z)
     place = width * (1 + block)
-    store_block(solid.dilated, place, _dilated(solid, block, x, y, z, cofactors))
+    v = shape_of(solid, block, VOLUME)
+    dilated = _dilated(v, x, y, z, cofactors)
+    store_block(solid.dilated, place, dilated)
+    if is_averaged:
+        store_gradients(solid, block, v, (x, y, z), dilated)
     if has_stiffened:
         factor = stiffening_factor(law, stretch_invariant(x, y, z, *cofactors))
     else:
@@ -153,17 +154,16 @@ def _write_gradient(solid: Solid, block: int, has_stiffened: bool) -> None:
 
 
 @kernel
-def pressures(solid: Solid, nodes: IntArray, begin: int, end: int) -> None:
-    """Write lam (J - 1) of `nodes[begin:end]`, from the volumes around them."""
-    for i in range(begin, end):
-        _write_pressure(solid, natural(nodes[natural(i)]))
+def average_volumes(solid: Solid, begin: int, end: int) -> None:
+    """Write what is averaged around the nodes from `begin` to `end`, from the tetrahedra there.
 
-
-@kernel
-def pressures_in_order(solid: Solid, begin: int, end: int) -> None:
-    """Write lam (J - 1) of the nodes from `begin` to `end`: `pressures` without a list."""
-    for node in range(begin, end):
-        _write_pressure(solid, natural(node))
+    That is lam (J - 1), and the stress of averaged shear; `begin` is a multiple of eight.
+    """
+    if averages_shear(solid):
+        average_around_nodes(solid, begin, end)
+    else:
+        for node in range(begin, end):
+            _write_pressure(solid, natural(node))
 
 
 @inlined
@@ -173,41 +173,48 @@ def _write_pressure(solid: Solid, node: int) -> None:
 
 
 @kernel
-def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
-    """Write the forces on the corners of the tetrahedra of `blocks[begin:end]`.
+def corner_forces(solid: Solid, begin: int, end: int) -> None:
+    """Write the forces on the corners of the tetrahedra of the blocks from `begin` to `end`.
 
-    Args:
-        solid: Written; gradients, and pressures where volumes are averaged, are up to date.
-        blocks: Blocks of tetrahedra.
-        begin: First block, as an index in `blocks`.
-        end: End of the blocks.
+    Gradients, and what is averaged around nodes, are up to date.
     """
-    # Two loops, so that the code of elastic blocks is without a branch.
-    if relaxes(solid):
-        for i in range(begin, end):
-            _corner_forces_of(solid, blocks[i], True)
+    # Loops of their own, so that the code of each is without a branch.
+    if averages_shear(solid):
+        if relaxes(solid):
+            for block in range(begin, end):
+                _corner_forces_of(solid, natural(block), True, True)
+        else:
+            for block in range(begin, end):
+                _corner_forces_of(solid, natural(block), False, True)
+    elif relaxes(solid):
+        for block in range(begin, end):
+            _corner_forces_of(solid, natural(block), True, False)
     else:
-        for i in range(begin, end):
-            _corner_forces_of(solid, blocks[i], False)
+        for block in range(begin, end):
+            _corner_forces_of(solid, natural(block), False, False)
 
 
 @inlined
-def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
+def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool, is_averaged: bool) -> None:
     """Write the forces on the corners of the tetrahedra of a block.
 
     Args:
         solid: Written.
         block: The block.
         has_relaxed: Whether stress has relaxed in it; a constant where this is called.
+        is_averaged: Whether a share of the shear is averaged around nodes; a constant, too.
     """
     law, width = solid.law, width_of(solid.shape)
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
-    p = pressure_of(solid, block, v)
+    if is_averaged:
+        mean, p = stress_of_nodes(solid, block, v)
+        p = with_own_pressure(solid, block, v, p)
+    else:
+        p = pressure_of(solid, block, v)
     if has_relaxed:
         p = p - relaxed_pressure(solid, block)
-    trace = x.x + y.y + z.z
-    cx, cy, cz = cofactors_of(x, y, z)
+    cofactors = cofactors_of(x, y, z)
     factor = load_block(solid.stiffening, width * (1 + block))
     if stiffens(law):
         rest = splat(law.mu, v) * factor
@@ -215,24 +222,22 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
     else:
         s = factor
         rest = splat(0.75 * law.mu, v)
+    if is_averaged:
+        own = splat(1.0 - law.shear_of_nodes, v)
+        s, rest = own * s, own * rest
     # The factors of H, K and 1, times -V:
     minus_v = splat(-1.0, v) * v
     a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
-    px = Vec3(
-        a * x.x + b * (trace - x.x + cx.x) + c,
-        a * x.y + b * (cx.y - y.x),
-        a * x.z + b * (cx.z - z.x),
-    )
-    py = Vec3(
-        a * y.x + b * (cy.x - x.y),
-        a * y.y + b * (trace - y.y + cy.y) + c,
-        a * y.z + b * (cy.z - z.y),
-    )
-    pz = Vec3(
-        a * z.x + b * (cz.x - x.z),
-        a * z.y + b * (cz.y - y.z),
-        a * z.z + b * (trace - z.z + cz.z) + c,
-    )
+    if is_averaged:
+        push = splat(flat_modulus(law), v) * flatness(solid, block, v)
+        b, c = b + push, c + push
+    px, py, pz = stress_of(a, b, c, (x, y, z), cofactors)
+    if is_averaged:
+        px, py, pz = (
+            axpy(minus_v, mean[0], px),
+            axpy(minus_v, mean[1], py),
+            axpy(minus_v, mean[2], pz),
+        )
     if has_relaxed:
         px, py, pz = with_relaxed(solid, block, v, (px, py, pz), (x, y, z))
     f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
@@ -252,6 +257,13 @@ def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
     law, p = solid.law, splat(0.0, v)
     if law.lam_of_nodes != 0.0:
         p = splat(0.25, v) * _pressure_of_nodes(solid, block)
+    return with_own_pressure(solid, block, v, p)
+
+
+@inlined
+def with_own_pressure(solid: Solid, block: int, v: Lanes, p: Lanes) -> Lanes:
+    """Return pressures with those that follow from J of each tetrahedron by itself [Pa]."""
+    law = solid.law
     if law.lam_of_tetrahedra != 0.0:
         p = p + splat(law.lam_of_tetrahedra, v) * own_dilatation(solid, block, v)
     return p
@@ -265,114 +277,24 @@ def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
 
 
 @inlined
-def gradient_of_displacement(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the rows of H of the tetrahedra of a block, after `displacements`."""
-    x0, y0, z0 = _corners(solid, block, 0)
-    x1, y1, z1 = _corners(solid, block, 1)
-    x2, y2, z2 = _corners(solid, block, 2)
-    x3, y3, z3 = _corners(solid, block, 3)
-    g1 = gradient_of_shape(solid, block, 0)
-    g2 = gradient_of_shape(solid, block, 3)
-    g3 = gradient_of_shape(solid, block, 6)
-    return (
-        _row_of_gradient(x1 - x0, x2 - x0, x3 - x0, g1, g2, g3),
-        _row_of_gradient(y1 - y0, y2 - y0, y3 - y0, g1, g2, g3),
-        _row_of_gradient(z1 - z0, z2 - z0, z3 - z0, g1, g2, g3),
-    )
+def _dilated(v: Lanes, x: Vec3, y: Vec3, z: Vec3, cofactors: MatrixRows) -> Lanes:
+    """Return V (J - 1) of the tetrahedra of a block, J - 1 = tr H + tr cof H + det H.
 
-
-@inlined
-def keeps_gradients(solid: Solid) -> bool:
-    """Return whether H is kept between two loops over the tetrahedra, not computed twice.
-
-    In single precision that takes a sixth less time. Doubles would not fit the cache.
+    Args:
+        v: Volumes [m3].
+        x: First row of H.
+        y: Second row.
+        z: Third row.
+        cofactors: MatrixRows of cof H.
     """
-    return width_of(solid.shape) > WIDTH
-
-
-@inlined
-def known_gradient(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the rows of H of the tetrahedra of a block, after `displacement_gradients`."""
-    if keeps_gradients(solid):
-        width = width_of(solid.shape)
-        at = 9 * width * block
-        return (
-            _load_vector(solid, at),
-            _load_vector(solid, at + 3 * width),
-            _load_vector(solid, at + 6 * width),
-        )
-    return gradient_of_displacement(solid, block)
-
-
-@inlined
-def _row_of_gradient(d1: Lanes, d2: Lanes, d3: Lanes, g1: Vec3, g2: Vec3, g3: Vec3) -> Vec3:
-    return Vec3(
-        d1 * g1.x + d2 * g2.x + d3 * g3.x,
-        d1 * g1.y + d2 * g2.y + d3 * g3.y,
-        d1 * g1.z + d2 * g2.z + d3 * g3.z,
-    )
-
-
-@inlined
-def cofactors_of(x: Vec3, y: Vec3, z: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the rows of cof H from the rows of H."""
-    return cross(y, z), cross(z, x), cross(x, y)
-
-
-@inlined
-def _dilated(
-    solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, cofactors: tuple[Vec3, Vec3, Vec3]
-) -> Lanes:
-    """Return V (J - 1) of the tetrahedra of a block, J - 1 = tr H + tr cof H + det H."""
     cx, cy, cz = cofactors
     growth = (x.x + y.y + z.z) + (cx.x + cy.y + cz.z) + dot(x, cx)
-    return shape_of(solid, block, VOLUME) * growth
+    return v * growth
 
 
 @inlined
 def _product(px: Vec3, py: Vec3, pz: Vec3, g: Vec3) -> Vec3:
     return Vec3(dot(px, g), dot(py, g), dot(pz, g))
-
-
-@inlined
-def _corners(solid: Solid, block: int, k: int) -> tuple[Lanes, Lanes, Lanes]:
-    """Return the displacements of corner `k` of the tetrahedra of a block."""
-    width = width_of(solid.shape)
-    return points_of_rows(solid.displacement, solid.nodes, width * (4 * block + k))
-
-
-@inlined
-def _store_vector(solid: Solid, at: int, v: Vec3) -> None:
-    width = width_of(solid.shape)
-    store_block(solid.gradient, at, v.x)
-    store_block(solid.gradient, at + width, v.y)
-    store_block(solid.gradient, at + 2 * width, v.z)
-
-
-@inlined
-def _load_vector(solid: Solid, at: int) -> Vec3:
-    width = width_of(solid.shape)
-    return Vec3(
-        load_block(solid.gradient, at),
-        load_block(solid.gradient, at + width),
-        load_block(solid.gradient, at + 2 * width),
-    )
-
-
-@inlined
-def shape_of(solid: Solid, block: int, which: int) -> Lanes:
-    """Return a quantity of `Solid.shape` for the tetrahedra of a block."""
-    return load_block(solid.shape, width_of(solid.shape) * (N_SHAPE * block + which))
-
-
-@inlined
-def gradient_of_shape(solid: Solid, block: int, first: int) -> Vec3:
-    """Return the gradient of a shape function [1/m], which begins at that quantity of `shape`."""
-    return Vec3(
-        shape_of(solid, block, first),
-        shape_of(solid, block, first + 1),
-        shape_of(solid, block, first + 2),
-    )
 
 
 @inlined

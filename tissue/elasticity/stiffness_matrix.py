@@ -6,18 +6,18 @@ order (a test compares the two).
 
 Springs: K = sum of k u u^T, k by van Gelder. Change of volume: each node has the mean dilatation of
 the tetrahedra around it, by volume; besides springs, a share acts on each tetrahedron by itself
-(`OWN_SHARE`). Neo-Hookean law: shear of each tetrahedron by itself, and dilatation averaged over
-nodes (Smith, de Goes and Kim 2018; see `tissue.elasticity.neo_hookean`). Laws that stiffen: the
-same, but nothing is taken from the dilatation of a tetrahedron by itself.
+(`OWN_SHARE`). Laws of solids: dilatation averaged over nodes, and of the shear a share, the rest
+of each tetrahedron by itself (`tissue.elasticity.averaged_shear`). Of the dilatation that each of
+these strains has by itself the law takes a part away (`EnergyDensity.excess`).
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.laws.energy_density import OWN_SHARE
+from tissue.laws.energy_density import OWN_SHARE, averaged_shear
 from tissue.material import Material
 from tissue.types import TetrahedralMesh
 
@@ -73,7 +73,7 @@ def masses(mesh: TetrahedralMesh, density: float) -> FloatArray:
 
 
 def stiffness_matrix(
-    mesh: TetrahedralMesh, material: Material, *, averaged: bool = True
+    mesh: TetrahedralMesh, material: Material, *, averaged: bool = True, element: str = "averaged"
 ) -> "csr_array":
     """Return K of the body at rest [N/m], shape (3 n_nodes, 3 n_nodes), x y z of each node in turn.
 
@@ -82,6 +82,7 @@ def stiffness_matrix(
         material: What the body is made of, with its law.
         averaged: Whether dilatation is averaged over nodes, as in the engine; False for plain
             linear tetrahedra, which lock (for comparison).
+        element: How tetrahedra are strained under laws of solids (`SolverSettings.element`).
     """
     density = material.law.density(material.moduli)
     if material.law.has_springs:
@@ -92,11 +93,16 @@ def stiffness_matrix(
         mixed = own * _own_dilatation(mesh) + (1.0 - own) * _mean_dilatation(mesh)
         return springs + material.volume_modulus * mixed
     assert density is not None  # without springs tetrahedra are elastic
+    if averaged and element == "averaged":
+        density = averaged_shear(density)
+    share = density.shear_of_nodes
     dilatation = _mean_dilatation if averaged else _own_dilatation
+    own = density.lam_of_tetrahedra - (1.0 - share) * density.excess
     return (
-        _of_shear(mesh, material.mu)
-        + (density.lam_of_tetrahedra - density.excess) * _own_dilatation(mesh)
-        + density.lam_of_nodes * dilatation(mesh)
+        (1.0 - share) * _of_shear(mesh, material.mu)
+        + share * _of_mean_shear(mesh, material.mu)
+        + own * _own_dilatation(mesh)
+        + (density.lam_of_nodes - share * density.excess) * dilatation(mesh)
     )
 
 
@@ -117,15 +123,37 @@ def _own_dilatation(mesh: TetrahedralMesh) -> "csr_array":
 
 def _mean_dilatation(mesh: TetrahedralMesh) -> "csr_array":
     """Return the Hessian of the sum over nodes of V (div u)^2 / 2, div u averaged at each [m]."""
+    mean, at_node = _means(mesh)
+    shape, _ = gradients(mesh)
+    return _squared(mean @ _rows(mesh.tetrahedra, shape, len(at_node)), at_node)
+
+
+def _of_mean_shear(mesh: TetrahedralMesh, mu: float) -> "csr_array":
+    """Return the Hessian of the sum over nodes of mu V eps:eps, eps averaged at each [N/m]."""
+    mean, at_node = _means(mesh)
+    shape, _ = gradients(mesh)
+    total: Any = 0.0
+    for c in range(3):
+        for d in range(c, 3):
+            vectors = np.zeros((*mesh.tetrahedra.shape, 3))
+            vectors[..., c] += 0.5 * shape[..., d]
+            vectors[..., d] += 0.5 * shape[..., c]
+            weight = (1.0 if c == d else 2.0) * 2.0 * mu
+            rows = mean @ _rows(mesh.tetrahedra, vectors, len(at_node))
+            total = total + weight * _squared(rows, at_node)
+    return total
+
+
+def _means(mesh: TetrahedralMesh) -> tuple["csr_array", FloatArray]:
+    """Return the matrix of averages around nodes, from tetrahedra, and the volumes there [m3]."""
     from scipy.sparse import csr_array
 
-    shape, volume = gradients(mesh)
+    volume = gradients(mesh).volume
     n_nodes, n_tets = len(mesh.positions), len(volume)
     quarter = np.repeat(volume / 4.0, 4)
     at_node = _at_nodes(mesh, quarter)
     where = (mesh.tetrahedra.ravel(), np.repeat(np.arange(n_tets), 4))
-    mean = csr_array((quarter / at_node[where[0]], where), shape=(n_nodes, n_tets))
-    return _squared(mean @ _rows(mesh.tetrahedra, shape, n_nodes), at_node)
+    return csr_array((quarter / at_node[where[0]], where), shape=(n_nodes, n_tets)), at_node
 
 
 def _of_shear(mesh: TetrahedralMesh, mu: float) -> "csr_array":

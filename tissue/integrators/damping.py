@@ -24,16 +24,16 @@ from tissue.core.simd import point, store_point, times
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.energy import dissipated_power, relaxed_energy
 from tissue.elasticity.finite_elements import n_blocks
-from tissue.elasticity.neo_hookean import has_averaged_volumes
+from tissue.elasticity.neo_hookean import has_averages
 from tissue.elasticity.viscoelasticity import prepare_relaxation
 from tissue.forces.rigid_motion import add_rigid_part
 from tissue.forces.step_context import Damping, Stages, StepContext
 from tissue.forces.supports import add_support_damping
 from tissue.integrators.node_loops import (
+    AVERAGES,
     DAMPING_CHANGES,
     DISPLACEMENTS,
     GRADIENTS,
-    PRESSURES,
     STRESS_RELAXATION,
     run_loop,
 )
@@ -157,8 +157,8 @@ def relax_stress(context: StepContext, seconds: float) -> None:
     prepare_relaxation(solid, seconds)
     run_loop(context, DISPLACEMENTS, 0.0)
     run_loop(context, GRADIENTS, 0.0)
-    if has_averaged_volumes(solid):
-        run_loop(context, PRESSURES, 0.0)
+    if has_averages(solid):
+        run_loop(context, AVERAGES, 0.0)
     before = relaxed_energy(solid, blocks) if is_counted else 0.0
     run_loop(context, STRESS_RELAXATION, 0.0)
     if is_counted:

@@ -3,10 +3,10 @@
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.elasticity.neo_hookean import has_averaged_volumes
+from tissue.elasticity.neo_hookean import has_averages
 from tissue.forces.step_context import Instant, StepContext
 from tissue.forces.terms import add_reactions, add_terms
-from tissue.integrators.node_loops import CORNER_FORCES, DEFORMED, GRADIENTS, PRESSURES, run_loop
+from tissue.integrators.node_loops import AVERAGES, CORNER_FORCES, DEFORMED, GRADIENTS, run_loop
 
 
 @kernel
@@ -44,6 +44,6 @@ def _deform(context: StepContext, loop_of_displacements: int) -> None:
             run_loop(context, loop_of_displacements, 0.0)
         if loop_of_displacements != DEFORMED:
             run_loop(context, GRADIENTS, 0.0)
-        if has_averaged_volumes(solid):
-            run_loop(context, PRESSURES, 0.0)
+        if has_averages(solid):
+            run_loop(context, AVERAGES, 0.0)
         run_loop(context, CORNER_FORCES, 0.0)

@@ -48,6 +48,8 @@ class Numerics(NamedTuple):
     """Whether damping acts between steps; if not, in every stage of them."""
     is_single: bool
     """Whether forces of tetrahedra are computed in single precision."""
+    averages_shear: bool
+    """Whether a share of the shear of tetrahedra is averaged around nodes."""
     moves_together: bool
     """Whether all nodes are moved together; if not, as the paper does."""
 
@@ -87,6 +89,7 @@ class TissueModel:
             self.visits,
             mass_scaling=numerics.mass_scaling,
             is_single=numerics.is_single,
+            averages_shear=numerics.averages_shear,
             resists_collapse=numerics.moves_together,
         )
         around = np.zeros(LARGEST_STAR, dtype=np.int64)

@@ -7,7 +7,7 @@ wrote; sums are gathered. So the result does not depend on who runs which part o
 
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
-from tissue.core.simd_blocks import store_row
+from tissue.core.simd_points import store_row
 from tissue.core.simd_rows import natural
 from tissue.core.thread_team import (
     claim_first,
@@ -19,13 +19,9 @@ from tissue.core.thread_team import (
     wait_for_others,
 )
 from tissue.elasticity.finite_elements import n_blocks
+from tissue.elasticity.gradients import displacements
 from tissue.elasticity.internal_forces import viscous_force
-from tissue.elasticity.neo_hookean import (
-    corner_forces,
-    displacement_gradients,
-    displacements,
-    pressures_in_order,
-)
+from tissue.elasticity.neo_hookean import average_volumes, corner_forces, displacement_gradients
 from tissue.elasticity.viscoelasticity import relax_blocks
 from tissue.forces.acceleration import acceleration, acceleration_of, is_solid
 from tissue.forces.step_context import Stages, StepContext
@@ -33,7 +29,7 @@ from tissue.mesh.body import Body
 
 GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
 """Loops over blocks of tetrahedra."""
-DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, PRESSURES = 3, 4, 5, 6
+DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, AVERAGES = 3, 4, 5, 6
 """Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
 DISPLACED = -1
 """Stands for a loop of displacements where the loop before has written them."""
@@ -139,20 +135,20 @@ def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
     """Run a part of a loop of `deform_shared`, or of relaxation."""
     solid, body, stages = context.elastic.solid, context.body, context.stages
     if loop == GRADIENTS:
-        displacement_gradients(solid, solid.every, begin, end)
+        displacement_gradients(solid, begin, end)
     elif loop == CORNER_FORCES:
-        corner_forces(solid, solid.every, begin, end)
+        corner_forces(solid, begin, end)
     elif loop == STRESS_RELAXATION:
         relax_blocks(solid, begin, end)
-    elif loop == PRESSURES:
-        pressures_in_order(solid, begin, end)
+    elif loop == AVERAGES:
+        average_volumes(solid, begin, end)
     else:
         positions = body.positions
         if loop == DISPLACEMENTS_2:
             positions = stages.positions
         elif loop == DISPLACEMENTS_LAST:
             positions = stages.last_positions
-        displacements(solid, body, positions, solid.every, begin, end)
+        displacements(solid, body, positions, begin, end)
 
 
 @inlined

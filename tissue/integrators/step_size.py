@@ -9,15 +9,16 @@ from typing import Final
 
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
-from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.finite_elements import Solid, averages_shear
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
-from tissue.elasticity.neo_hookean import keeps_gradients
+from tissue.elasticity.gradients import keeps_gradients
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import bound_of_terms, press_at_rest
 from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
 from tissue.integrators.mass_limits import limit_mass, limit_mass_for_strain
 from tissue.integrators.methods import METHODS, OF_LAST_STEP, OF_NEXT_STEP
 from tissue.integrators.node_loops import (
+    AVERAGES,
     DISPLACEMENTS,
     DISPLACEMENTS_LAST,
     GRADIENTS,
@@ -254,10 +255,12 @@ def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLi
             if keeps:
                 run_loop(context, DISPLACEMENTS_LAST, 0.0)
                 run_loop(context, GRADIENTS, 0.0)
+                _average(context)
             strained = strained_frequency(elastic, body, ahead, visits, limit, keeps)
     if keeps and _GRADIENTS[choice.method] == OF_NEXT_STEP:
         run_loop(context, DISPLACEMENTS, 0.0)
         run_loop(context, GRADIENTS, 0.0)
+        _average(context)
         solid.are_gradients_known = 1
         is_known = True
     found = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
@@ -265,3 +268,11 @@ def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLi
     choice.allowed = limit.allowed
     choice.moved = 0.0
     solid.is_bound_current = 1
+
+
+@kernel
+def _average(context: StepContext) -> None:
+    """Find the stiffness of averaged shear, under laws that stiffen."""
+    solid = context.elastic.solid
+    if stiffens(solid.law) and averages_shear(solid):
+        run_loop(context, AVERAGES, 0.0)

@@ -35,7 +35,9 @@ SCRATCH = frozenset(
         *(f"Stages.{name}" for name in ("positions", "last_positions", "velocities", "change")),
         *(f"Stages.{name}" for name in ("a1", "a2", "start_positions", "start_velocities")),
         # Evaluations of forces and frequencies.
-        *(f"Solid.{name}" for name in ("forces", "ring", "ring_nodes", "fast_blocks")),
+        *(f"Solid.{name}" for name in ("forces", "ring", "rest_ring", "ring_nodes")),
+        *(f"Solid.{name}" for name in ("fast_blocks", "node_gradient", "node_stress")),
+        "Solid.gradient_rows",
         "Collapsing.scratch",
         # Searches of one pass of a cut.
         *(f"CutScratch.{name}" for name in ("around", "around_too", "parents", "parent_links")),

@@ -26,7 +26,7 @@ from tissue.integrators.model import Numerics, TissueModel
 from tissue.material import Material, warn_of_ratio
 from tissue.mesh.body import build_body
 from tissue.mesh.validation import expect_sound
-from tissue.solver_settings import PRECISIONS, SolverSettings
+from tissue.solver_settings import ELEMENTS, PRECISIONS, SolverSettings
 from tissue.stepping.energy_audit import Audit
 from tissue.stepping.stages import StepStages
 from tissue.types import TetrahedralMesh
@@ -72,6 +72,7 @@ def assembled(
         mass_scaling=solver.mass_scaling,
         damps_between_steps=method.damps_between_steps,
         is_single=solver.precision == "single",
+        averages_shear=solver.element == "averaged",
         moves_together=not isinstance(options, Hierarchical),
     )
     model = TissueModel(body, material, weight, blade, floor, numerics)
@@ -187,10 +188,11 @@ def _checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpt
             f"threads is {solver.threads}; relaxation='hierarchical' runs on one. Use threads=1, "
             "or relaxation='global' or 'verlet'"
         )
-    if solver.precision not in PRECISIONS:
-        raise ValueError(
-            f"precision is {solver.precision!r}; it must be one of {', '.join(PRECISIONS)}"
-        )
+    for name, choices in (("element", ELEMENTS), ("precision", PRECISIONS)):
+        if getattr(solver, name) not in choices:
+            raise ValueError(
+                f"{name} is {getattr(solver, name)!r}; it must be one of {', '.join(choices)}"
+            )
     if solver.mass_scaling is not None and not solver.mass_scaling > 0.0:
         raise ValueError(
             f"mass_scaling is {solver.mass_scaling}; it is an angular frequency [1/s] and must be "

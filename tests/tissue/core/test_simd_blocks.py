@@ -9,17 +9,25 @@ from tissue.core.simd_blocks import (
     gathered_like,
     load_block,
     logarithm,
-    points_of_rows,
-    row_of_lane,
     splat,
     store_block,
+    sum_of_lanes,
+    width_of,
+)
+from tissue.core.simd_columns import (
+    columns_of_rows,
+    store_columns,
+    store_sum_of_rows,
+    sums_of_four_rows,
+)
+from tissue.core.simd_points import (
+    points_of_rows,
+    row_of_lane,
     store_everywhere,
     store_row,
     store_rows,
     sum_of_eight_rows,
-    sum_of_lanes,
     values_of_rows,
-    width_of,
 )
 from tissue.core.simd_rows import larger, largest, where_larger
 
@@ -145,6 +153,29 @@ def test_eight_rows_are_summed_to_a_point_of_doubles(real):
     np.testing.assert_array_equal(rows[2, :3], points[1].astype(real))
     expected = rows[OF[8:16], :3].astype(np.float64).sum(axis=0)
     np.testing.assert_allclose(plain[0], expected, rtol=8 * np.finfo(real).eps)
+
+
+def columns_there_and_back(values, of, rows, out):
+    store_columns(out, 0, sums_of_four_rows(rows, of, 0))
+    width = width_of(values)
+    store_columns(out, width, columns_of_rows(rows, 3))
+    store_sum_of_rows(out, 2 * width, float(values[0]), rows, of, 8, 13)
+
+
+@pytest.mark.kernel
+def test_rows_of_ten_are_summed_and_turned_into_columns_and_back(real):
+    values, rows = filled(16, real), filled(16 * 40, real).reshape(40, 16)
+    width = 64 // values.itemsize
+    of = np.random.default_rng(3).integers(0, 40, 4 * width).astype(np.int32)
+    out = np.zeros((2 * width + 1, 16), real)
+    found = both(columns_there_and_back, values, of, rows, out=out)
+    compiled, plain = (each[:, :10] for each in found)
+    np.testing.assert_array_equal(compiled, plain)
+    places = of.reshape(4, width)
+    np.testing.assert_allclose(plain[:width], rows[places, :10].sum(axis=0), rtol=1e-6)
+    np.testing.assert_array_equal(plain[width:-1], rows[3 : 3 + width, :10])
+    expected = values[0] * rows[of[8:24], :10].sum(axis=0)
+    np.testing.assert_allclose(plain[-1], expected, rtol=1e-6)
 
 
 @kernel

@@ -69,7 +69,7 @@ def test_node_volumes_are_a_quarter_of_the_rest_volumes_around_the_node(mesh):
     for t, volume in enumerate(volumes):
         assert solid.shape[shape_place(solid, t, VOLUME)] == pytest.approx(volume, rel=1e-12)
     expected = naive_solid.around_nodes(mesh, volumes)
-    np.testing.assert_allclose(solid.node_volume, expected, rtol=1e-12)
+    np.testing.assert_allclose(solid.node_volume[: len(expected)], expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

@@ -14,14 +14,6 @@ bound of each tetrahedron by itself with a quarter of its own mass, 2 c_p sqrt(s
 altitude^2), is up to 7 times above: a sliver has next to no mass, but it shares its nodes with
 tetrahedra that have.
 
-Better weights bring it near the truth where it is highest (`tighten`). It holds for any positive
-weights x of the nodes, as the largest ratio (B x)_b / x_b does for a matrix B without negative
-entries, whose own largest eigenvalue is the least such ratio (Collatz and Wielandt). The power
-iteration x <- B x lowers the ratio in each round. Here only nodes near the worst take part, since
-the others do not limit the time step. A fast mode is concentrated on one or two nodes, which get a
-larger weight than by their mass. On an organ after cuts that lowers the bound from 1.28 to 1.06
-times the highest frequency.
-
 A fixed node does not move: it counts as infinitely heavy.
 """
 
@@ -31,8 +23,10 @@ from typing import NamedTuple
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
+from tissue.elasticity.averaged_shear import FLAT_MODULUS, J_LIMIT
 from tissue.elasticity.finite_elements import (
     Solid,
+    averages_shear,
     corner_of_slot,
     node_place,
     normals,
@@ -40,6 +34,7 @@ from tissue.elasticity.finite_elements import (
     tetrahedron_of_slot,
 )
 from tissue.geometry.tetrahedron import add_square, largest_eigenvalue, nothing_symmetric
+from tissue.laws.energy_density import EnergyDensity
 from tissue.laws.kernels import stiffens
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -49,18 +44,6 @@ STALE = 2.0
 gives a bound, and that of the mass now is near the best; but another weight changes the bound two
 rings further. If weights never change, nodes that were split several times, or were given a larger
 weight for a neighbour that is gone, make the bound twice too high."""
-
-
-ROUNDS = 6
-"""Rounds at most. In the organ the result is within 2 % of the least possible bound."""
-
-NEAR_WORST = 0.64
-"""Share of the highest bound on w^2 above which a node gets another weight. Nearer to 1 takes more
-rounds, further from it more nodes."""
-
-WORTH_IT = 0.98
-"""Ratio of the highest bound on w^2 after and before a round above which the round is the last: in
-a regular mesh all nodes are equal, and there is nothing to gain."""
 
 
 @kernel
@@ -196,10 +179,11 @@ def dilatation_term(
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
         t = tetrahedron_of_slot(solid, slot)
         n1, n2, n3, _ = normals(body, points, t)
-        n = _add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
-        n = _add_to_ring(solid, visits, n, t, 1, n1)
-        n = _add_to_ring(solid, visits, n, t, 2, n2)
-        n = _add_to_ring(solid, visits, n, t, 3, n3)
+        n0 = scale(-1.0, add(n1, add(n2, n3)))
+        n = _add_to_ring(solid, visits, n, t, 0, n0, n0)
+        n = _add_to_ring(solid, visits, n, t, 1, n1, n1)
+        n = _add_to_ring(solid, visits, n, t, 2, n2, n2)
+        n = _add_to_ring(solid, visits, n, t, 3, n3, n3)
     total = 0.0
     for i in range(n):
         total += solid.weight[solid.ring_nodes[i]] * norm(vec3(solid.ring, i))
@@ -208,17 +192,31 @@ def dilatation_term(
 
 
 @inlined
-def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
-    """Add a share of V grad N / 4 to node `k` of a tetrahedron; return the nodes listed so far."""
+def _add_to_ring(
+    solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3, at_rest: Vec3
+) -> int:
+    """Add a share of V grad N / 4 to a node of a tetrahedron; return the nodes listed so far.
+
+    Args:
+        solid: Its rings are written.
+        visits: For marks.
+        n: Nodes listed so far.
+        t: The tetrahedron.
+        k: Which of its nodes.
+        normal: 6 V grad N [m2].
+        at_rest: The same at rest [m2].
+    """
     node = solid.nodes[node_place(solid, t, k)]
     if visits.nodes[node] != visits.epoch:
         visits.nodes[node] = visits.epoch
         visits.place[node] = n
         solid.ring_nodes[n] = node
         store(solid.ring, n, Vec3(0.0, 0.0, 0.0))
+        store(solid.rest_ring, n, Vec3(0.0, 0.0, 0.0))
         n += 1
     at = visits.place[node]
     store(solid.ring, at, axpy(1.0 / 24.0, normal, vec3(solid.ring, at)))
+    store(solid.rest_ring, at, axpy(1.0 / 24.0, at_rest, vec3(solid.rest_ring, at)))
     return n
 
 
@@ -259,10 +257,11 @@ def bounds_of_node(
     if weight == 0.0:
         return NodeBounds(0.0, 0.0)
     law = solid.law
-    # The part of lam that is not averaged, at small strain. Where it is negative it is limited: the
-    # bound still holds.
-    mu = law.shear_modulus
-    lam = max(law.lam_of_tetrahedra - law.excess, -2.0 / 3.0 * mu)
+    # The part of lam of each tetrahedron by itself, at small strain. Where it is negative it is
+    # limited: the bound still holds.
+    own_share = 1.0 - law.shear_of_nodes
+    mu = own_share * law.shear_modulus
+    lam = max(law.lam_of_tetrahedra - own_share * law.excess, -2.0 / 3.0 * mu)
     averaged = law.lam_of_nodes != 0.0
     has_stiffened = is_strained and stiffens(law)
     isotropic, stiffness = 0.0, nothing_symmetric()
@@ -279,12 +278,14 @@ def bounds_of_node(
             + solid.weight[solid.nodes[node_place(solid, t, 3)]] * norm(n3)
         )
         at_rest = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
-        normal = at_rest
+        normal, flat = at_rest, 0.0
         if is_strained:
-            n1, n2, n3, _ = normals(body, points, t)
+            n1, n2, n3, now = normals(body, points, t)
             normal = n1 if k == 1 else (n2 if k == 2 else n3)
             if k == 0:
                 normal = scale(-1.0, add(n1, add(n2, n3)))
+            if averages_shear(solid) and now < J_LIMIT * volume:
+                flat = FLAT_MODULUS * law.shear_modulus
         length = norm(at_rest)
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
         if has_stiffened:
@@ -295,19 +296,49 @@ def bounds_of_node(
             stiffness = add_square(stiffness, slope, along)
         else:
             isotropic += mu * share * length
-        c = (mu + lam) * share / length
+        c = (mu + lam + flat) * share / length
         stiffness = add_square(stiffness, c, normal)
         if averaged:
             for other in range(4):
-                n = _add_to_ring(solid, visits, n, t, other, normal)
+                n = _add_to_ring(solid, visits, n, t, other, normal, at_rest)
+    mass = body.masses[node]
+    if averages_shear(solid):
+        isotropic += _averaged_shear(solid, n, has_stiffened) / weight
+    shear_of_lam = _lam_of_averaged_shear(law) / law.lam_of_nodes if averaged else 0.0
     for i in range(n):
         normal = vec3(solid.ring, i)
         length = norm(normal)
         if length > 0.0:
-            c = dilatation[solid.ring_nodes[i]] / (weight * length)
+            c = (1.0 + shear_of_lam) * dilatation[solid.ring_nodes[i]] / (weight * length)
             stiffness = add_square(stiffness, c, normal)
-    mass = body.masses[node]
     return NodeBounds((isotropic + largest_eigenvalue(stiffness)) / mass, isotropic / mass)
+
+
+@inlined
+def _lam_of_averaged_shear(law: EnergyDensity) -> float:
+    """Return mu and the part of lam of averaged shear [Pa], which is limited as in tetrahedra."""
+    mu = law.shear_modulus
+    return law.shear_of_nodes * (mu - min(law.excess, 2.0 / 3.0 * mu))
+
+
+@inlined
+def _averaged_shear(solid: Solid, n: int, has_stiffened: bool) -> float:
+    """Return what the shear of averages adds to |N_b|, times the weight of the node.
+
+    As for averaged volumes: F of node a changes by the sum of u_b C_b^T / V_a. At rest in any case,
+    as the shear of tetrahedra.
+
+    Args:
+        solid: The ring of the node at rest, and what `dilatation_term` is at rest.
+        n: Length of the ring.
+        has_stiffened: Whether stiffness is that of `Solid.node_stiffness`.
+    """
+    law, total = solid.law, 0.0
+    for i in range(n):
+        node = solid.ring_nodes[i]
+        stiffness = float(solid.node_stiffness[node]) if has_stiffened else 1.0
+        total += stiffness * solid.dilatation[node] * norm(vec3(solid.rest_ring, i))
+    return total * law.shear_of_nodes * law.shear_modulus / law.lam_of_nodes
 
 
 @inlined
@@ -319,47 +350,3 @@ def _stretched(body: Body, points: FloatArray, t: int, a: Vec3) -> Vec3:
     total = axpy(dot(n2, a), sub(vec3(points, body.tetrahedra[t, 2]), x0), total)
     total = axpy(dot(n3, a), sub(vec3(points, body.tetrahedra[t, 3]), x0), total)
     return scale(1.0 / (6.0 * volume), total)
-
-
-@kernel
-def tighten(solid: Solid, body: Body, visits: Visits, n_listed: int, allowed: float) -> int:
-    """Change the weights of the worst nodes of `solid.listed` until their bounds are `allowed`.
-
-    Args:
-        solid: Weights and bounds are written.
-        body: For the masses.
-        visits: For searches.
-        n_listed: Nodes listed; the bound of other nodes is not above `allowed`.
-        allowed: Bound on w^2 that the rest of the body has [1/s2]; lower bounds are of no use.
-
-    Returns:
-        Length of `solid.listed` with all nodes whose bound has changed.
-    """
-    listed, raised = solid.listed, solid.raised
-    worst = _worst(solid, n_listed)
-    for _ in range(ROUNDS):
-        if worst <= allowed:
-            break
-        threshold = max(NEAR_WORST * worst, allowed)
-        n = 0
-        for i in range(n_listed):
-            node = listed[i]
-            if solid.frequency_squared[node] > threshold:
-                solid.weight[node] *= solid.frequency_squared[node] / threshold
-                raised[n] = node
-                n += 1
-        n = bound_around(solid, body, visits, raised, with_neighbours(solid, visits, raised, n))
-        n_listed = with_these(visits, listed, n_listed, raised, n)
-        before, worst = worst, _worst(solid, n_listed)
-        if worst > WORTH_IT * before:
-            break
-    return n_listed
-
-
-@kernel
-def _worst(solid: Solid, n_listed: int) -> float:
-    """Return the highest bound on w^2 of the listed nodes [1/s2]."""
-    worst = 0.0
-    for i in range(n_listed):
-        worst = max(worst, solid.frequency_squared[solid.listed[i]])
-    return worst

@@ -12,8 +12,9 @@ import math
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import dot, vec3
-from tissue.elasticity.frequency.at_rest import bound_solid_frequencies, tighten
+from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.frequency.strained import bound_tetrahedra, forget_tests
+from tissue.elasticity.frequency.weights import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.mass_scaling import LIMIT_STEP, MassScaling, scale_masses
 from tissue.elasticity.springs import bound_frequencies

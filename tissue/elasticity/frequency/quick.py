@@ -16,16 +16,13 @@ from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import gathered_like, load_block, splat, store_block, width_of
 from tissue.core.simd_rows import any_above, larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, cross, dot
-from tissue.elasticity.finite_elements import Solid, n_blocks
+from tissue.elasticity.averaged_shear import FLAT_MODULUS, J_LIMIT, mean_stiffness
+from tissue.elasticity.finite_elements import Solid, averages_shear, n_blocks
+from tissue.elasticity.gradients import gradient_of_displacement, gradient_of_shape, known_gradient
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.neo_hookean import (
-    gradient_of_displacement,
-    gradient_of_shape,
-    known_gradient,
-)
+from tissue.elasticity.stress import cofactors_of, shear_stiffness
 from tissue.laws.kernels import (
     stiffening_factor,
-    stiffening_slope,
     stiffens,
     stretch_invariant,
 )
@@ -35,6 +32,11 @@ UNNOTICED = 1.05
 most of a body in gravity. The steps are short enough for more (`SAFETY` of the stability limits).
 With 1, tetrahedra near the limit at rest would be tested wherever they are stretched at all, and
 get mass."""
+
+
+FLAT_GROWTH = FLAT_MODULUS / (4.0 / 3.0)
+"""The modulus of flat tetrahedra over that of their shear against the motion of one node, which is
+the least that they have at rest."""
 
 
 @kernel
@@ -60,8 +62,11 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
             stiffness = _write_stiffness(solid, block, x, y, z, is_known)
             room = room - load_block(solid.shear_share, place) * stiffness
             least = where_larger(stiffness, least, room, least)
+        cofactors = _cofactors(x, y, z)
         room = larger(room, least)
-        if _grows_further(solid, block, _cofactors(x, y, z), room):
+        if averages_shear(solid):
+            room = room - _growth_of_flat(x, cofactors)
+        if _grows_further(solid, block, cofactors, room):
             solid.fast_blocks[n] = block
             n += 1
     return n
@@ -85,7 +90,10 @@ def quick_bounds(elastic: Elastic, block: int, is_known: bool) -> float:
     solid = elastic.solid
     law, place = solid.law, width_of(solid.shape) * (1 + block)
     x, y, z = _gradient(solid, block, is_known)
-    growth = _growth(solid, block, _cofactors(x, y, z))
+    cofactors = _cofactors(x, y, z)
+    growth = _growth(solid, block, cofactors)
+    if averages_shear(solid):
+        growth = growth + _growth_of_flat(x, cofactors)
     at_rest = _highest_with_contact(elastic, solid, block, growth)
     bound = growth * at_rest
     further = growth / load_block(solid.tested_growth, place)
@@ -169,6 +177,19 @@ def _growth(solid: Solid, block: int, cofactors: tuple[Vec3, Vec3, Vec3]) -> Lan
 
 
 @inlined
+def _growth_of_flat(x: Vec3, cofactors: tuple[Vec3, Vec3, Vec3]) -> Lanes:
+    """Return what the resistance of flat tetrahedra adds to the bound at rest, as a share of it.
+
+    Args:
+        x: First row of H.
+        cofactors: Rows of cof F.
+    """
+    one = splat(1.0, x.x)
+    j = dot(Vec3(x.x + one, x.y, x.z), cofactors[0])
+    return where_larger(splat(J_LIMIT, j), j, splat(FLAT_GROWTH, j), splat(0.0, j))
+
+
+@inlined
 def _grows_further(
     solid: Solid, block: int, cofactors: tuple[Vec3, Vec3, Vec3], room: Lanes
 ) -> bool:
@@ -202,8 +223,7 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, is_kno
 
     It is returned.
 
-    A node that moves by u changes F by u times grad N. The second derivative of J by that is 0, and
-    that of the energy is mu (g |dF|^2 + 2 g' ((F - cof F) : dF)^2).
+    Of a share of the shear it is that at the nodes (`tissue.elasticity.averaged_shear`).
 
     Args:
         solid: Written.
@@ -213,22 +233,17 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, is_kno
         z: Third row.
         is_known: Whether `displacement_gradients` has found g.
     """
-    trace = x.x + y.y + z.z
-    cx, cy, cz = cross(y, z), cross(z, x), cross(x, y)
-    two = splat(2.0, trace)
-    # The rows of H - K, K = (tr H) 1 - H^T + cof H:
-    ax = Vec3(two * x.x - trace - cx.x, x.y + y.x - cx.y, x.z + z.x - cx.z)
-    ay = Vec3(y.x + x.y - cy.x, two * y.y - trace - cy.y, y.z + z.y - cy.z)
-    az = Vec3(z.x + x.z - cz.x, z.y + y.z - cz.y, two * z.z - trace - cz.z)
-    squared = dot(ax, ax) + dot(ay, ay) + dot(az, az)
-    q = stretch_invariant(x, y, z, cx, cy, cz)
+    cofactors = cofactors_of(x, y, z)
+    q = stretch_invariant(x, y, z, *cofactors)
     place = width_of(solid.shape) * (1 + block)
     if not is_known:
         store_block(solid.stiffening, place, stiffening_factor(solid.law, q))
     g = load_block(solid.stiffening, place)
-    slope = stiffening_slope(solid.law, q, g)
+    stiffness, slope = shear_stiffness(solid.law, q, g, (x, y, z), cofactors)
     store_block(solid.stiffening_slope, place, slope)
-    stiffness = g + (slope + slope) * squared
+    if averages_shear(solid):
+        of_nodes = splat(solid.law.shear_of_nodes, g)
+        stiffness = stiffness + of_nodes * (mean_stiffness(solid, block, g) - stiffness)
     store_block(solid.stiffness, place, stiffness)
     return stiffness
 

@@ -22,15 +22,22 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd_blocks import width_of
 from tissue.core.vec3 import dot, vec3
-from tissue.elasticity.finite_elements import Solid, n_blocks, node_place, tetrahedron_of_slot
+from tissue.elasticity.finite_elements import (
+    Solid,
+    averages_shear,
+    n_blocks,
+    node_place,
+    tetrahedron_of_slot,
+)
 from tissue.elasticity.frequency.at_rest import bounds_of_node, dilatation_term
 from tissue.elasticity.frequency.quick import (
     list_fast_blocks,
     quick_bounds,
     quick_bounds_of_one,
 )
+from tissue.elasticity.gradients import displacements
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.neo_hookean import displacements
+from tissue.elasticity.neo_hookean import deform_solid
 from tissue.laws.kernels import stiffens
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -84,12 +91,16 @@ def strained_frequency(
         visits: For searches.
         limit: It need not be nearer to the truth than the number of steps requires. The bound is
             not below what they allow where the tetrahedra are.
-        is_known: Whether `displacement_gradients` was run there, and gradients are kept.
+        is_known: Whether `displacement_gradients` was run there, and gradients are kept; under laws
+            that stiffen averages as well.
     """
     solid = elastic.solid
     solid.test += 1
     if not is_known:
-        displacements(solid, body, points, solid.every, 0, body.n_nodes)
+        if averages_shear(solid) and stiffens(solid.law):
+            deform_solid(solid, body, points)
+        else:
+            displacements(solid, body, points, 0, body.n_nodes)
     width, left, last = width_of(solid.shape), MOST_TESTS, solid.fastest
     allowed, highest, solid.fastest = limit.allowed, 0.0, -1
     # Most often the fastest one still is: what needs no more steps than it is not looked at.

@@ -9,7 +9,7 @@ from tests.support import bodies, incisions
 from tests.tissue.solids import LAWS, SolidBody, highest_frequency, lame, law_of, solid_of
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.core.jit import is_compiling
-from tissue.elasticity.frequency.at_rest import tighten
+from tissue.elasticity.frequency.weights import tighten
 from tissue.laws.energy_density import volume_term
 from tissue.mesh.star import no_visits
 
