@@ -22,6 +22,7 @@ from benchmarks.timing import TurnWatch
 from scalpel_sim.validate.beam import limit
 from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.watch import SILENT
+from scalpel_sim.validate.torsion import TORSION_CONSTANT
 from tissue import FloatArray, Material, TetrahedralMesh, block, lattice_block
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 
@@ -46,9 +47,6 @@ ON_LATTICE = (0.0, 0.45)
 """Poisson's ratios that are studied on a lattice as well."""
 
 MODES = ("bending 1", "bending 2", "torsion 1", "stretching 1")
-
-TORSION_CONSTANT = 0.140577
-"""Torsion constant of a square section over a^4, by Saint-Venant's series."""
 
 
 def mesh_study(
@@ -137,8 +135,9 @@ class Bar:
         self.is_end = x > self.length * (1.0 - 1e-9)
         self.is_free = np.repeat(x > 1e-9 * self.length, 3)
         self.masses = masses(self.mesh, self.material.density)
-        how = {"averaged": model.averaged, "element": model.element}
-        matrix = stiffness_matrix(self.mesh, self.material, **how)
+        matrix = stiffness_matrix(
+            self.mesh, self.material, averaged=model.averaged, element=model.element
+        )
         self.stiffness = matrix[self.is_free][:, self.is_free].tocsc()
 
     @cached_property

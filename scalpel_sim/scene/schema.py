@@ -162,7 +162,7 @@ class SolverTable(TomlTable, kw_only=True, frozen=True):
     frequency [1/s; 0: off]. The added mass has no weight, and the table says how much it is."""
     element: Text = "averaged"
     """How tetrahedra are strained: averaged, a share of their shear around nodes, so that coarse
-    meshes bend and twist; or plain, each by itself, which is stiffer and a third faster."""
+    meshes bend and twist; or plain, each by itself, which is stiffer and a sixth faster."""
     precision: Text = "single"
     """Precision of the forces of tetrahedra: single, or double, which takes a third longer.
     Positions and velocities are double."""

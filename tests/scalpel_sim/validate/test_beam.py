@@ -141,6 +141,12 @@ def test_a_free_bar_that_goes_to_theory_with_the_square_passes():
     assert [check.value for check in checks[2:]] == pytest.approx([2.0, 1.0, 1.0])
 
 
+def test_the_strongest_of_two_swings_has_the_period():
+    time = np.linspace(0.0, 6.5, 326)
+    swing = np.cos(2.0 * np.pi * time / 1.01) + 0.5 * np.cos(2.0 * np.pi * 3.19 * time)
+    assert beam.strongest_period(time, swing) == pytest.approx(1.01, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("coarse", "fine", "expected"),
     [
