@@ -65,6 +65,7 @@ from .stepping.acting_forces import ActingForce as ActingForce
 from .tissue import Tissue as Tissue
 from .types import CUT_COLOUR as CUT_COLOUR
 from .types import SKIN_COLOUR as SKIN_COLOUR
+from .types import AddedMass as AddedMass
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
 from .types import Energies as Energies
@@ -81,6 +82,7 @@ from .types import TissueError as TissueError
 
 __all__ = [
     "ActingForce",
+    "AddedMass",
     "BladeSegment",
     "BladeShape",
     "BladeSweep",

@@ -30,6 +30,7 @@ def snapshot_of(body: Body) -> Snapshot:
         body.rest[:n].copy(),
         body.velocities[:n].copy(),
         body.masses[:n] - body.added_masses[:n],
+        body.added_masses[:n].copy(),
         body.tetrahedra[: body.n_tetrahedra].copy(),
         body.fixed[:n].copy(),
     )

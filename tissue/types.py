@@ -4,7 +4,7 @@ SI units. Every vector in this package is in the tissue frame. The suffixes `_t0
 the start and the end of a step.
 """
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -139,6 +139,40 @@ class BodyContacts(NamedTuple):
     between the body's faces add up to zero."""
 
 
+N_OF_ADDED_MASS: Final = 13
+"""Numbers of `AddedMass`."""
+
+
+class AddedMass(NamedTuple):
+    """Mass that mass scaling has added to nodes, which moves with them and has no weight.
+
+    The momentum of the own mass and of this one together changes by the impulses of all forces on
+    the tissue, of which weight acts on the own mass alone, and by `impulse`.
+    """
+
+    mass: float
+    """All of it [kg]."""
+    momentum: FloatArray
+    """Its momentum [N s], shape (3,)."""
+    angular_momentum: FloatArray
+    """Its angular momentum about the origin [N m s], shape (3,)."""
+    impulse: FloatArray
+    """Impulse of mass scaling since the body was made [N s], shape (3,): where nodes keep their
+    velocities as mass is added or taken back, that mass comes and goes with its momentum."""
+    angular_impulse: FloatArray
+    """Angular impulse of mass scaling about the origin [N m s], shape (3,)."""
+
+    @classmethod
+    def of_numbers(cls, numbers: FloatArray) -> Self:
+        """Return added mass from all its numbers, shape (`N_OF_ADDED_MASS`,)."""
+        return cls(float(numbers[0]), *numbers[1:].reshape(4, 3))
+
+    @property
+    def numbers(self) -> FloatArray:
+        """All numbers in order, shape (`N_OF_ADDED_MASS`,)."""
+        return np.concatenate(([self.mass], *self[1:]))
+
+
 class StepResult(NamedTuple):
     """The result of one step."""
 
@@ -182,6 +216,8 @@ class StepResult(NamedTuple):
     """Contacts of the body with itself and the floor."""
     stage_times: StageTimes
     """Wall time of the stages."""
+    added_mass: AddedMass
+    """Mass that mass scaling has added, at t1."""
     energies: Energies | None
     """Energy balance since the body was made; None without an audit."""
 
@@ -195,6 +231,11 @@ class StepResult(NamedTuple):
         """`bounds` in plain numbers."""
         low, high = self.bounds.tolist()
         return low, high
+
+    @property
+    def numbers_at_end(self) -> FloatArray:
+        """The numbers of `stiffness`, row by row, and then of `added_mass`, in one array."""
+        return np.concatenate((self.stiffness.ravel(), self.added_mass.numbers))
 
     @property
     def account(self) -> FloatArray | None:
@@ -222,7 +263,9 @@ class Snapshot(NamedTuple):
     velocities: FloatArray
     """Velocities of the nodes [m/s], shape (n_nodes, 3)."""
     masses: FloatArray
-    """Masses of the nodes [kg], shape (n_nodes,)."""
+    """Masses of the nodes [kg], shape (n_nodes,): their own."""
+    added_masses: FloatArray
+    """Masses that mass scaling has added to them [kg], shape (n_nodes,); see `AddedMass`."""
     tetrahedra: IntArray
     """Node indices, shape (n_tets, 4)."""
     fixed: BoolArray

@@ -174,6 +174,14 @@ def _cut(frame: FrameData) -> tuple[float, ...]:
     )
 
 
+def _added_mass(frame: FrameData) -> list[float]:
+    """Return the mass that mass scaling has added, its momenta, and the impulses it gave."""
+    there, added = frame.tissue_frame, frame.result.added_mass.numbers
+    added[1:] = there.vectors_to_world(added[1:].reshape(4, 3)).ravel()
+    move_moments(added, there.numbers_of_origin)
+    return list(added.tolist())
+
+
 def _account(frame: FrameData) -> tuple[float, ...]:
     """Return the terms of the energy account, and the residual [J]."""
     energies = frame.result.energies
@@ -217,6 +225,16 @@ COLUMNS: dict[str, ColumnGroup] = {
         _cut,
     ),
     "account": ColumnGroup({"account": ACCOUNT}, _account),
+    "added_mass": ColumnGroup(
+        {
+            "added_mass": ("added_mass_kg",),
+            "added_momentum": vector_columns("added_momentum", "ns"),
+            "added_angular_momentum": vector_columns("added_angular_momentum", "nms"),
+            "scaling_impulse": vector_columns("scaling_impulse", "ns"),
+            "scaling_angular_impulse": vector_columns("scaling_angular_impulse", "nms"),
+        },
+        _added_mass,
+    ),
     "wall_times": ColumnGroup({"wall_times": WALL_TIMES}, _wall_times),
 }
 """Groups of columns that each run records, in order. Those of attachments and of instruments follow
@@ -224,10 +242,12 @@ after them. Vectors are in the world frame. `force` and `torque` are what the ar
 over the frame, the torque about the tip; `tissue_force` and `tissue_torque` are what the tissue
 exerts, before the limits of the device. `edge_force`, `pressing_force` and `friction_force` are
 what the tissue does to the blade's edge, to its faces, and along them, at the end of the frame;
-`stiffness` is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall
-times of the stages that the paper's Table 1 names: collision detection, geometric changes,
-relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering (`rd_s`)
-and without the recording of its row (`recording_s`: of the columns up to there)."""
+`stiffness` is how fast that force changes with the blade's position. `added_mass` is the mass that
+mass scaling has added, then its momentum and its angular momentum about the origin of the world, in
+N s and N m s, and what mass scaling gave of both since the start: see `tissue.AddedMass`. `cd_s` to
+`rd_s` are wall times of the stages that the paper's Table 1 names: collision detection, geometric
+changes, relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering
+(`rd_s`) and without the recording of its row (`recording_s`: of the columns up to there)."""
 
 
 def shared_columns() -> tuple[str, ...]:
@@ -289,3 +309,18 @@ def add_up(
             else:
                 parts[3 + axis] -= pressing
                 parts[6 + axis] -= friction[i, axis]
+
+
+@kernel
+def move_moments(added: FloatArray, origin: tuple[float, float, float]) -> None:
+    """Move angular momenta of `tissue.AddedMass` to the origin of the world.
+
+    Args:
+        added: Its numbers, along the axes of the world; written.
+        origin: Origin of the tissue in the world [m].
+    """
+    for k in (1, 7):
+        x, y, z = added[k], added[k + 1], added[k + 2]
+        added[k + 3] += origin[1] * z - origin[2] * y
+        added[k + 4] += origin[2] * x - origin[0] * z
+        added[k + 5] += origin[0] * y - origin[1] * x

@@ -13,6 +13,7 @@ from bridge import InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.recording.columns import ColumnGroup, FrameData
 from tissue import (
+    AddedMass,
     BodyContacts,
     FloatArray,
     MaterialPoints,
@@ -199,5 +200,6 @@ def result_at_rest(link: TissueLink) -> StepResult:
         n_substeps=0,
         body_contacts=BodyContacts(0, 0.0, 0.0, zero),
         stage_times=StageTimes(0.0, 0.0, 0.0),
+        added_mass=AddedMass(0.0, zero, zero, zero, zero),
         energies=None,
     )

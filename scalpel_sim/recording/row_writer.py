@@ -14,15 +14,20 @@ from scalpel_sim.recording.columns import (
     FrameData,
     add_up,
     frame_row,
+    move_moments,
 )
 from scalpel_sim.recording.recording import Recording
 from tissue import FloatArray
 from tissue.support import SameTypes, kernel
 
 _Nine = tuple[float, float, float, float, float, float, float, float, float]
+_Three = tuple[float, float, float]
 _Six = tuple[float, float, float, float, float, float]
 
-_SHARED = tuple(COLUMNS[name] for name in ("motion", "force_parts", "cut", "account", "wall_times"))
+_SHARED = tuple(
+    COLUMNS[name]
+    for name in ("motion", "force_parts", "cut", "account", "added_mass", "wall_times")
+)
 """The groups that a kernel writes, where they come first."""
 
 _N_SHARED = sum(len(group.columns) for group in _SHARED)
@@ -30,6 +35,12 @@ _N_SHARED = sum(len(group.columns) for group in _SHARED)
 _AT_ACCOUNT = 36
 """Where the account of energy begins in a row."""
 _N_ACCOUNT = len(ACCOUNT)
+_AT_ADDED_MASS = _AT_ACCOUNT + _N_ACCOUNT
+"""Where the numbers of `tissue.AddedMass` begin."""
+_STIFFNESS = 36
+"""Numbers of a stiffness."""
+_N_ADDED_MASS = len(COLUMNS["added_mass"].columns)
+_AT_WALL_TIMES = _AT_ADDED_MASS + _N_ADDED_MASS
 
 _NO_ACCOUNT = np.zeros(0)
 
@@ -40,9 +51,12 @@ class _OfResult(NamedTuple):
     normal: FloatArray
     normal_force: FloatArray
     friction: FloatArray
-    stiffness: FloatArray
+    at_end: FloatArray
+    """`StepResult.numbers_at_end`."""
     account: FloatArray
     """No numbers without an account."""
+    origin: _Three
+    """Origin of the tissue in the world [m]."""
     cut_area: float
     finished_area: float
     n_tetrahedra: int
@@ -71,8 +85,9 @@ class RowWriter:
         if self._has_kernel:
             # Compiled for floats, and before the first frame.
             none, nine, zeros = np.zeros((0, 3)), (0.0,) * 9, (0.0,) * 6
-            arrays = none, np.zeros(0), none, np.zeros((6, 6)), _NO_ACCOUNT
-            result = _OfResult(*arrays, 0.0, 0.0, 0, 0.0, 0.0)
+            at_end = np.zeros(_STIFFNESS + _N_ADDED_MASS)
+            arrays = none, np.zeros(0), none, at_end, _NO_ACCOUNT
+            result = _OfResult(*arrays, (0.0,) * 3, 0.0, 0.0, 0, 0.0, 0.0)
             self._write.call(np.zeros((1, _N_SHARED)), 0, 0.0, nine, nine, nine, result, zeros)
 
     def append(self, frame: FrameData) -> None:
@@ -98,8 +113,9 @@ class RowWriter:
                 contacts.normal,
                 contacts.normal_force,
                 contacts.friction,
-                result.stiffness,
+                result.numbers_at_end,
                 _NO_ACCOUNT if account is None else account,
+                frame.tissue_frame.numbers_of_origin,
                 result.cut_area,
                 result.finished_area,
                 result.n_tetrahedra,
@@ -142,17 +158,19 @@ def _write(
     for i in range(6):
         row[4 + i] = felt[i]
         row[10 + i] = raw[i]
-    forward, stiffness = (blade[6], blade[7], blade[8]), result.stiffness
+    forward, at_end = (blade[6], blade[7], blade[8]), result.at_end
     add_up(result.normal, result.normal_force, result.friction, forward, row[16:25])
     for axis in range(3):
-        row[25 + axis] = stiffness[axis, axis]
-    row[28] = stiffness[0, 1]
-    row[29] = stiffness[0, 2]
-    row[30] = stiffness[1, 2]
+        row[25 + axis] = at_end[7 * axis]
+    row[28], row[29], row[30] = at_end[1], at_end[2], at_end[8]
     row[31], row[32], row[33] = result.cut_area, result.finished_area, result.n_tetrahedra
     row[34], row[35] = result.anchored_length, result.work_of_blade
     account = result.account
     for i in range(_N_ACCOUNT):
         row[_AT_ACCOUNT + i] = account[1 + i] if len(account) > 0 else math.nan
+    added = row[_AT_ADDED_MASS:_AT_WALL_TIMES]
+    for i in range(len(added)):
+        added[i] = at_end[_STIFFNESS + i]
+    move_moments(added, result.origin)
     for i in range(6):
-        row[_AT_ACCOUNT + _N_ACCOUNT + i] = wall_times[i]
+        row[_AT_WALL_TIMES + i] = wall_times[i]

@@ -32,7 +32,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
-from tissue.types import RigidContacts
+from tissue.types import N_OF_ADDED_MASS, RigidContacts
 
 
 class WrenchReport(Arrays):
@@ -64,9 +64,11 @@ class WrenchReport(Arrays):
     """Change of the wrench with a displacement and rotation of the blade, shape (6, 6)."""
     amounts: FloatArray
     """The numbers of `Amounts`."""
+    added: FloatArray
+    """The numbers of `AddedMass`, shape (13,)."""
     plain: FloatArray
     """All but the contacts in plain numbers: mean wrench, tip, wrench, mean force, amounts, bounds,
-    stiffness."""
+    stiffness, added mass."""
 
 
 class Amounts(NamedTuple):
@@ -91,6 +93,7 @@ class Amounts(NamedTuple):
 AMOUNTS = slice(18, 18 + len(Amounts._fields))
 BOUNDS = slice(AMOUNTS.stop, AMOUNTS.stop + 6)
 STIFFNESS = slice(BOUNDS.stop, BOUNDS.stop + 36)
+ADDED = slice(STIFFNESS.stop, STIFFNESS.stop + N_OF_ADDED_MASS)
 """Places in `WrenchReport.plain`."""
 
 
@@ -99,7 +102,7 @@ def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
     capacity = (
         n_more + len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.spine.state)
     )
-    plain = np.zeros(STIFFNESS.stop)
+    plain = np.zeros(ADDED.stop)
     return WrenchReport(
         n_contacts=0,
         point=np.zeros((capacity, 3)),
@@ -114,6 +117,7 @@ def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
         bounds=plain[BOUNDS].reshape(2, 3),
         stiffness=plain[STIFFNESS].reshape(6, 6),
         amounts=plain[AMOUNTS],
+        added=plain[ADDED],
         plain=plain,
     )
 

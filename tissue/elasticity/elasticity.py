@@ -21,7 +21,7 @@ from tissue.elasticity.frequency.changes import (
 )
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, no_mass_scaling
+from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, add_momentum, no_mass_scaling
 from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
 from tissue.laws.energy_density import averaged_shear, volume_term
@@ -35,7 +35,7 @@ ROOM_FOR_SPRINGS = 1 << 16
 """Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
 
 _FORGET_ADDED_MASS, _BUILD_ROWS = SameTypes(forget_added_mass), SameTypes(build_rows)
-_RETURN_SPIN = SameTypes(return_spin)
+_RETURN_SPIN, _ADD_MOMENTUM = SameTypes(return_spin), SameTypes(add_momentum)
 
 
 class Elasticity:
@@ -113,6 +113,20 @@ class Elasticity:
             inherit_relaxed(self.arrays.solid, change.children, change.n_children)
         self._write(body, visits, change.dirty[: change.n_dirty], nodes)
         _RETURN_SPIN.call(body, change, self._density, nodes, len(nodes))
+
+    def before_cut(self, body: Body) -> None:
+        """Note the momentum of added mass before the mesh changes; see `after_cut`."""
+        self._count_momentum(body, -1.0)
+
+    def after_cut(self, body: Body) -> None:
+        """Count what the momentum of added mass has changed by as the impulse of mass scaling."""
+        self._count_momentum(body, 1.0)
+
+    def _count_momentum(self, body: Body, factor: float) -> None:
+        scaling = self.arrays.scaling
+        if scaling.allowed < math.inf:
+            every = self.arrays.solid.every
+            _ADD_MOMENTUM.call(body, every, body.n_nodes, factor, scaling.impulse)
 
     def return_mass(self, body: Body) -> None:
         """Take back mass that nodes got between cuts and do not need at rest."""

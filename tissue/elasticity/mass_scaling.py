@@ -4,6 +4,9 @@ A cut leaves slivers, whose nodes have next to no mass and whose fastest modes l
 them. Explicit dynamics slows such modes by added mass where they are faster than the motion that is
 requested (selective mass scaling; Belytschko, Liu and Moran, Nonlinear Finite Elements, 6.3). The
 added mass is moved and has no weight: equilibrium is the same.
+
+It has momentum of its own: forces change the sum of this and the momentum of the tissue. Where a
+node keeps its velocity as its mass changes, that sum changes by an impulse, which is counted.
 """
 
 from typing import NamedTuple
@@ -14,7 +17,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
-from tissue.core.vec3 import Vec3
+from tissue.core.vec3 import Vec3, axpy, cross, vec3
 from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.springs import Springs
 from tissue.mesh.body import Body
@@ -26,6 +29,10 @@ sliver. At 0.02 the lowest frequencies of the body are at most 1 % lower."""
 
 LIMIT_STEP = 1.02
 """Factor by which the limit of frequencies is raised at once."""
+
+
+N_MOMENTA = 6
+"""Numbers of a momentum and an angular momentum."""
 
 
 class MassScaling(Arrays):
@@ -41,6 +48,9 @@ class MassScaling(Arrays):
     """The most that they had so far [kg]."""
     most: FloatCell
     """The most that they may get [kg]."""
+    impulse: FloatArray
+    """Momentum [N s], and angular momentum about the origin [N m s], that nodes got with mass, or
+    lost with it, where they kept their velocities; shape (`N_MOMENTA`,)."""
     lost: FloatCell
     """Kinetic energy that nodes lost where their mass changed between two cuts [J]."""
     is_used_up: IntCell
@@ -59,7 +69,11 @@ class MassScaling(Arrays):
 def no_mass_scaling() -> MassScaling:
     """Return that no node gets mass."""
     return MassScaling.new(
-        {}, allowed=np.inf, allowed_between_cuts=np.inf, allowed_where_strained=np.inf
+        {},
+        allowed=np.inf,
+        allowed_between_cuts=np.inf,
+        allowed_where_strained=np.inf,
+        impulse=np.zeros(N_MOMENTA),
     )
 
 
@@ -108,6 +122,33 @@ def scale_masses(
         springs.stiffness_per_mass[node] *= before / after
         of_contact[node] *= before / after
     return change
+
+
+@kernel
+def add_momentum(body: Body, nodes: IntArray, n: int, factor: float, momenta: FloatArray) -> float:
+    """Add the momentum of the mass that was added to nodes; return that mass [kg].
+
+    Args:
+        body: Masses, positions and velocities.
+        nodes: The nodes.
+        n: How many of them.
+        factor: By which it is multiplied.
+        momenta: Momentum [N s], then angular momentum about the origin [N m s], shape
+            (`N_MOMENTA`,); written.
+    """
+    mass, linear, angular = 0.0, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
+    for i in range(n):
+        added = body.added_masses[nodes[i]]
+        if added == 0.0:  # of most
+            continue
+        v = vec3(body.velocities, nodes[i])
+        mass += added
+        linear = axpy(added, v, linear)
+        angular = axpy(added, cross(vec3(body.positions, nodes[i]), v), angular)
+    for axis in range(3):
+        momenta[axis] += factor * linear[axis]
+        momenta[3 + axis] += factor * angular[axis]
+    return mass
 
 
 @inlined

@@ -4,18 +4,23 @@ Each call from Python costs 1 to 4 us. Where the begin needs something, a call r
 continues behind it.
 """
 
+import math
 from typing import Final
 
 from tissue.blade.blade_context import report_step
 from tissue.blade.edge import Edge, is_other_length
 from tissue.blade.forces import begin_blade_step
 from tissue.contact.search_stages import added_frequency, begin_contacts
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import norm, sub
 from tissue.cutting.incision import TOO_MANY, count_increments
+from tissue.elasticity.internal_forces import Elastic
+from tissue.elasticity.mass_scaling import N_MOMENTA, add_momentum
 from tissue.integrators.driver import Relaxation
 from tissue.integrators.stability import surely_takes_few_steps
+from tissue.mesh.body import Body
 from tissue.mesh.node_motion import is_motion_finite
 from tissue.stepping.energy_audit import Account, write_energies
 
@@ -110,14 +115,26 @@ def _divide_travel(frame: FrameContext, edge: Edge, has_blade: bool) -> bool:
 
 @kernel
 def end_frame(frame: FrameContext, edge: Edge, dt: float, known: int) -> None:
-    """Write what a time step came to for the blade, and the account of energy if one is kept.
+    """Write the report of a time step, and the account of energy if one is kept.
 
     Args:
-        frame: The report of the blade and the account are written.
+        frame: The report and the account are written.
         edge: The cutting edge over the time step.
         dt: Length of the time step [s].
         known: What of the account is known: see `write_energies`.
     """
-    report_step(frame.relaxation.blade, edge, dt)
+    relaxation = frame.relaxation
+    report_step(relaxation.blade, edge, dt)
+    _report_added_mass(relaxation.blade.report.added, relaxation.step.elastic, relaxation.step.body)
     if frame.account.is_kept == 1:
-        write_energies(frame.account, frame.relaxation.step, edge, 1.0, known)
+        write_energies(frame.account, relaxation.step, edge, 1.0, known)
+
+
+@kernel
+def _report_added_mass(added: FloatArray, elastic: Elastic, body: Body) -> None:
+    """Write the numbers of `tissue.types.AddedMass`; they stay 0 where no node gets mass."""
+    scaling = elastic.scaling
+    if scaling.allowed < math.inf:
+        for i in range(N_MOMENTA):
+            added[1 + i], added[7 + i] = 0.0, scaling.impulse[i]
+        added[0] = add_momentum(body, elastic.solid.every, body.n_nodes, 1.0, added[1:7])

@@ -5,12 +5,20 @@ from typing import Self
 
 import numpy as np
 
-from tissue.blade.wrench import AMOUNTS, BOUNDS, STIFFNESS, WrenchReport
+from tissue.blade.wrench import ADDED, AMOUNTS, BOUNDS, STIFFNESS, WrenchReport
 from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import FloatArray
 from tissue.core.lazy_fields import lazy_fields
 from tissue.core.three_vectors import Wrench
-from tissue.types import BodyContacts, BoxNumbers, Energies, RigidContacts, StageTimes, StepResult
+from tissue.types import (
+    AddedMass,
+    BodyContacts,
+    BoxNumbers,
+    Energies,
+    RigidContacts,
+    StageTimes,
+    StepResult,
+)
 
 
 @lazy_fields(
@@ -19,6 +27,7 @@ from tissue.types import BodyContacts, BoxNumbers, Energies, RigidContacts, Stag
     contacts=lambda result: result.all_contacts(),
     force_on_tissue=lambda result: result.numbers[15:18].copy(),
     bounds=lambda result: result.numbers[BOUNDS].reshape(2, 3),
+    added_mass=lambda result: AddedMass.of_numbers(result.numbers[ADDED]),
     energies=lambda result: result.energies_of_account(),
 )
 class LazyResult(StepResult):
@@ -31,6 +40,7 @@ class LazyResult(StepResult):
     terms: FloatArray | None
     corners: BoxNumbers
     contacts_of_blade = property(attrgetter("of_blade"))
+    numbers_at_end = property(lambda result: result.numbers[STIFFNESS.start :])
     account = property(attrgetter("terms"))
     box = property(attrgetter("corners"))
     has_views = True
@@ -69,7 +79,7 @@ class LazyResult(StepResult):
         fields = (
             *(Wrench.of_numbers((a, b, c, d, e, f, g, h, i)), None, None, None, None, None),
             *(int(n_tetrahedra), int(n_nodes), n_active, tip_tetrahedron, anchored_length),
-            *(cut_area, finished_area, work_of_blade, work_of_cutting, *of_step, None),
+            *(cut_area, finished_area, work_of_blade, work_of_cutting, *of_step, None, None),
         )
         result: Self = tuple.__new__(cls, fields)
         x, y, z, u, v, w = plain[BOUNDS]

@@ -367,6 +367,7 @@ class StepStages:
         return self.model.body, self.model.visits
 
     def _before_cut(self) -> None:
+        self.model.elasticity.before_cut(self.model.body)
         self.audit.before_cut(self.context, *self.model.interaction.edge_now)
 
     def _after_pass(self) -> None:
@@ -382,6 +383,7 @@ class StepStages:
         self.make_room()
 
     def _after_cut(self) -> None:
+        self.model.elasticity.after_cut(self.model.body)
         self.audit.after_cut(self.context, *self.model.interaction.edge_now)
 
     def make_room(self) -> None:

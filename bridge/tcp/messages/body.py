@@ -30,7 +30,7 @@ LARGEST_CHUNKS = LARGEST_FRAME
 """Largest reply with chunks [byte]: twenty thousand boxes, more than can be tested a thousand times
 a second."""
 
-_NODE_BYTES = 3 * 8 + 3 * 8 + 3 * 8 + 8 + 1
+_NODE_BYTES = 3 * 8 + 3 * 8 + 3 * 8 + 8 + 8 + 1
 _TETRAHEDRON_BYTES = 4 * 8
 _VERTEX_BYTES = 3 * 8 + 3 * 8
 _TRIANGLE_BYTES = 3 * 8 + 1
@@ -55,7 +55,7 @@ def values_bytes(n_nodes: int) -> int:
 
 
 def _check_snapshot(snapshot: Snapshot) -> None:
-    expect_finite(*snapshot[:4])
+    expect_finite(*snapshot[:5])
     _expect_indices(snapshot.tetrahedra, len(snapshot.masses), "tetrahedra")
 
 
@@ -99,6 +99,7 @@ SNAPSHOT: Message[Snapshot] = Message(
         rest_positions=("nodes", 3),
         velocities=("nodes", 3),
         masses=("nodes",),
+        added_masses=("nodes",),
         tetrahedra=("tetrahedra", 4),
         fixed=("nodes",),
     ),

@@ -20,6 +20,7 @@ from bridge.tcp.messages.encoding import MAP_BYTES, Count, Message, Record
 from bridge.tcp.wire import MessageError
 from tissue import (
     LARGEST_COORDINATE,
+    AddedMass,
     BladeSegment,
     BladeSweep,
     BodyContacts,
@@ -186,6 +187,13 @@ RESULT: Message[StepReply] = Message(
             n_substeps=Count,
             body_contacts=Record(BodyContacts, n_contacts=Count, force_of_floor=(3,)),
             stage_times=Record(StageTimes),
+            added_mass=Record(
+                AddedMass,
+                momentum=(3,),
+                angular_momentum=(3,),
+                impulse=(3,),
+                angular_impulse=(3,),
+            ),
             energies=Record(Energies),
         ),
         loads=LOADS_ON_FRAMES,

@@ -5,6 +5,7 @@ import numpy as np
 from bridge.driven import GeomLoads, no_geom_loads
 from bridge.link import TissueDescription
 from tissue import (
+    AddedMass,
     BladeSegment,
     BladeSweep,
     BodyContacts,
@@ -98,6 +99,7 @@ class Wall:
             n_substeps=1,
             body_contacts=BodyContacts(0, 0.0, 0.0, np.zeros(3)),
             stage_times=StageTimes(0.0, 0.0, 0.0),
+            added_mass=AddedMass(0.0, *np.zeros((4, 3))),
             energies=None,
         )
 

@@ -16,7 +16,7 @@ from scalpel_sim.recording.columns import (
 )
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.recording.row_writer import RowWriter
-from tissue import BladeSegment, Energies, RigidContacts, Wrench
+from tissue import AddedMass, BladeSegment, Energies, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FRAMES = {
@@ -39,14 +39,17 @@ def result_of(rng, n, energies=None):
         np.full(n, -1),
     )
     half = rng.normal(size=(6, 6))
+    added = AddedMass(rng.normal(), *rng.normal(size=(4, 3)))
     return SimpleNamespace(
         contacts_of_blade=contacts,
         stiffness=half @ half.T,
+        numbers_at_end=np.concatenate(((half @ half.T).ravel(), added.numbers)),
         cut_area=1.0,
         finished_area=2.0,
         n_tetrahedra=3,
         anchored_length=4.0,
         work_of_blade=5.0,
+        added_mass=added,
         energies=energies,
         account=None if energies is None else np.array((*energies, energies.residual)),
     )
@@ -74,7 +77,25 @@ def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
     stiffness = there.matrix_to_world(result.stiffness[:3, :3])
     assert row[25:31] == [stiffness[at] for at in AXES]
     assert row[31:36] == [1.0, 2.0, 3, 4.0, 5.0]
-    assert row[-6:-1] == list(range(5)) and np.isnan(row[36:-6]).all()
+    assert row[-6:-1] == list(range(5)) and np.isnan(row[36:-19]).all()
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("frame", FRAMES)
+def test_a_row_has_momenta_of_added_mass_about_the_origin_of_the_world(frame):
+    """Against a mass point, in either frame."""
+    rng, there = np.random.default_rng(3), FRAMES[frame]
+    places, motions = rng.normal(size=(2, 2, 3))
+    at, moving = there.points_to_world(places), there.vectors_to_world(motions)
+    result = result_of(rng, 0)
+    vectors = zip(motions, np.cross(places, motions), strict=True)
+    result.added_mass = AddedMass(0.7, *(each for pair in vectors for each in pair))
+    still = Wrench(*np.zeros((3, 3)))
+    row = row_of(0.5, BladeSegment(*np.eye(3)), still, still, result, there)
+    expected = [0.7, *np.hstack((moving, np.cross(at, moving))).ravel()]
+    assert row[-19:-6] == pytest.approx(expected, abs=1e-14)
+    first = shared_columns().index("added_mass_kg")
+    assert first == len(row) - 19
 
 
 @pytest.mark.kernel

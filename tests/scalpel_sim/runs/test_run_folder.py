@@ -37,7 +37,8 @@ def body():
     corners = np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)])
     tetrahedra = np.array([[3, 0, 1, 2], [7, 4, 5, 6]])
     is_held = np.arange(8) == 4
-    return Snapshot(corners, corners.copy(), np.zeros((8, 3)), np.ones(8), tetrahedra, is_held)
+    masses = np.ones(8), np.zeros(8)
+    return Snapshot(corners, corners.copy(), np.zeros((8, 3)), *masses, tetrahedra, is_held)
 
 
 @pytest.fixture(scope="module")

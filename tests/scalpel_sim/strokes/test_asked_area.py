@@ -28,7 +28,7 @@ def lying(mesh, positions=None):
     """Return a body that lies with its nodes elsewhere than at rest."""
     n = len(mesh.positions)
     positions = mesh.positions if positions is None else positions
-    nothing = np.zeros((n, 3)), np.ones(n)
+    nothing = np.zeros((n, 3)), np.ones(n), np.zeros(n)
     return Snapshot(positions, mesh.positions, *nothing, mesh.tetrahedra, np.zeros(n, bool))
 
 

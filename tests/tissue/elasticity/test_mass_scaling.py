@@ -238,13 +238,16 @@ def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_ba
     strained_bound(tissue)
     assert (body.masses[:n] > 1.01 * masses).any()
     body.velocities[:n, :3] = velocities = np.random.default_rng(0).normal(size=(n, 3))
-    heavier, scaling.lost = body.masses[:n].copy(), 0.0
+    heavier, scaling.lost, scaling.impulse[:] = body.masses[:n].copy(), 0.0, 0.0
     elasticity.return_mass(body)
     np.testing.assert_allclose(body.masses[:n], masses, rtol=1e-12)
     np.testing.assert_allclose(elasticity.arrays.frequency_squared[:n], bounds, rtol=1e-12)
     np.testing.assert_array_equal(body.velocities[:n, :3], velocities)
     lost = 0.5 * ((heavier - masses) * (velocities**2).sum(axis=1)).sum()
     assert scaling.lost == pytest.approx(lost, rel=1e-9)
+    taken = (masses - heavier)[:, None] * velocities
+    moments = np.cross(body.positions[:n, :3], taken)
+    np.testing.assert_allclose(scaling.impulse, np.hstack((taken, moments)).sum(axis=0), rtol=1e-9)
     assert scaling.added == pytest.approx(0.0, abs=1e-12 * masses.sum())
     measures = tissue.cut_report().now
     assert measures.added_mass == 0.0

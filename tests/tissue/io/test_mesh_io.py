@@ -275,7 +275,9 @@ def snapshot():
     moved = BLOCK.positions + rng.uniform(-1e-4, 1e-4, (n, 3))
     velocities, masses = rng.normal(size=(n, 3)), rng.uniform(1e-6, 1e-3, n)
     fixed = side_nodes(BLOCK, ["left"])
-    return Snapshot(moved, BLOCK.positions, velocities, masses, BLOCK.tetrahedra, fixed)
+    return Snapshot(
+        moved, BLOCK.positions, velocities, masses, 0.1 * masses, BLOCK.tetrahedra, fixed
+    )
 
 
 def test_a_snapshot_is_read_by_meshio_to_the_last_bit(tmp_path):
@@ -298,6 +300,7 @@ def test_the_cell_data_has_the_piece_of_each_tetrahedron(tmp_path):
         np.vstack([alone.positions * 0.001, BLOCK.positions]),
         np.zeros((n + 4, 3)),
         np.ones(n + 4),
+        np.zeros(n + 4),
         np.vstack([alone.tetrahedra, BLOCK.tetrahedra + 4]),
         np.zeros(n + 4, dtype=bool),
     )

@@ -16,7 +16,12 @@ from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.frequency.strained import bound_tetrahedra, forget_tests
 from tissue.elasticity.frequency.weights import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
-from tissue.elasticity.mass_scaling import LIMIT_STEP, MassScaling, scale_masses
+from tissue.elasticity.mass_scaling import (
+    LIMIT_STEP,
+    MassScaling,
+    add_momentum,
+    scale_masses,
+)
 from tissue.elasticity.springs import bound_frequencies
 from tissue.mesh.body import Body
 from tissue.mesh.changes import largest_frequency
@@ -98,7 +103,8 @@ def return_all_mass(elastic: Elastic, body: Body, every: IntArray) -> None:
 def return_mass(elastic: Elastic, body: Body, nodes: IntArray, n: int) -> None:
     """Take back mass that nodes do not need at rest; what it moved with is counted as lost.
 
-    Nodes keep their velocities, and with them the momentum of their own mass.
+    Nodes keep their velocities, and with them the momentum of their own mass. That of the mass that
+    they give back is the impulse of mass scaling.
 
     Args:
         elastic: The bounds of nodes, and what they have got; written.
@@ -108,9 +114,11 @@ def return_mass(elastic: Elastic, body: Body, nodes: IntArray, n: int) -> None:
     """
     scaling, springs, solid = elastic.scaling, elastic.springs, elastic.solid
     before = _energy_of_added_mass(body, nodes, n)
+    add_momentum(body, nodes, n, -1.0, scaling.impulse)
     limit = scaling.allowed, elastic.of_contact
     scaling.added += scale_masses(body, springs, solid, nodes, n, *limit)
     scaling.lost += before - _energy_of_added_mass(body, nodes, n)
+    add_momentum(body, nodes, n, 1.0, scaling.impulse)
     bound_frequencies(body, springs, nodes, n)
     bound_both_frequencies(elastic, nodes, n)
     bound_tetrahedra(elastic, body, nodes, n)

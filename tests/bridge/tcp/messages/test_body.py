@@ -25,6 +25,7 @@ TETRAHEDRON = Snapshot(
     rest_positions=np.full((4, 3), 0.1),
     velocities=np.full((4, 3), -0.2),
     masses=np.array([1.0, 2.0, 3.0, 4.0]),
+    added_masses=np.array([0.1, 0.0, 0.0, 0.0]),
     tetrahedra=np.array([[0, 1, 2, 3]]),
     fixed=np.array([True, False, False, True]),
 )
@@ -81,7 +82,7 @@ def with_nan(array):
         (SURFACE, SKIN._replace(triangles=np.array([[0, 1, 4], [0, 1, 3]])), "refer to points"),
         *(
             (SNAPSHOT, TETRAHEDRON._replace(**{name: with_nan(getattr(TETRAHEDRON, name))}), "fin")
-            for name in ("positions", "rest_positions", "velocities", "masses")
+            for name in ("positions", "rest_positions", "velocities", "masses", "added_masses")
         ),
         (SURFACE, SKIN._replace(positions=with_nan(SKIN.positions)), "not finite"),
         (VALUES, np.array([1.0, np.inf]), "not finite"),
