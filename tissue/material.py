@@ -286,10 +286,12 @@ class Material:
     def _shear_per_tension(self) -> float:
         """Retardation time in shear over that of a bar that is pulled or bent.
 
-        The ratio of viscosity to mu in shear does not depend on the Poisson's ratio. A pulled bar
-        has viscosity 2.5 mu per second of retardation time, and Young's modulus 2 mu (1 + nu).
+        Dampers in all directions are a body with both of Lame's constants mu per second of
+        retardation time. In a bar that narrows by nu times as much as it is stretched they have
+        viscosity (3 - 4 nu + 8 nu^2) mu per second, and its Young's modulus is 2 (1 + nu) mu.
         """
-        return 0.8 * (1.0 + self.poisson_ratio)
+        nu = self.poisson_ratio
+        return 2.0 * (1.0 + nu) / (3.0 - 4.0 * nu + 8.0 * nu * nu)
 
 
 def law_with(law: Law | str, parameters: dict[str, float]) -> Law:
