@@ -53,7 +53,7 @@ def validate(
             out/ and the name of its file.
         only: Only this scene; may be given several times. beam, stretch, steady,
             symmetry, rate, slicing, puncture, spine, reaction, contact, audit, coupling,
-            liver, incision, gel, tension.
+            liver, incision, gel, tension, silicone_bar, tissue_curves.
         quick: A few checks of each scene, in a minute or two instead of seven.
     """
     if case is not None:

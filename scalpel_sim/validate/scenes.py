@@ -11,6 +11,8 @@ from scalpel_sim.validate.findings import Findings, ValidationScene, sections
 from scalpel_sim.validate.gel import measure_gel
 from scalpel_sim.validate.incision import measure_incision
 from scalpel_sim.validate.liver import measure_liver
+from scalpel_sim.validate.measured.curves import measure_tissue_curves
+from scalpel_sim.validate.measured.silicone_bar import measure_silicone_bar
 from scalpel_sim.validate.puncture import measure_puncture
 from scalpel_sim.validate.rate import measure_rate
 from scalpel_sim.validate.reaction import measure_reaction
@@ -31,12 +33,14 @@ _MEASURES: dict[str, Callable[[bool], Findings]] = {
     "puncture": measure_puncture,
     "rate": measure_rate,
     "reaction": measure_reaction,
+    "silicone_bar": measure_silicone_bar,
     "slicing": measure_slicing,
     "spine": measure_spine,
     "steady": measure_steady,
     "stretch": measure_stretch,
     "symmetry": measure_symmetry,
     "tension": measure_tension,
+    "tissue_curves": measure_tissue_curves,
 }
 
 VALIDATION_SCENES: dict[str, ValidationScene] = {

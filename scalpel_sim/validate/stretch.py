@@ -1,5 +1,6 @@
 """Bars that are stretched: of each law against its formula, and of silicone against a curve."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -43,8 +44,8 @@ BARS: dict[str, Material] = {
 }
 """The material of the bar of each law; two stiffen several times at twice its length."""
 
-EnergyOf = Callable[[float, float], float]
-"""Energy per volume [Pa] of stretches along and across the bar."""
+EnergyOf = Callable[[float, float, float], float]
+"""Energy per volume [Pa] of three stretches at right angles."""
 
 
 class UniaxialStretch(NamedTuple):
@@ -62,20 +63,25 @@ def energy_of(material: Material) -> EnergyOf:
     """Return the energy of a homogeneous stretch, as the papers of the laws have it."""
     mu, lam = material.mu, material.lam
 
-    def stable_neo_hookean(along: float, across: float) -> float:
+    def stable_neo_hookean(*stretches: float) -> float:
         own, volume = 4.0 / 3.0 * mu, lam + 5.0 / 6.0 * mu
-        squared, ratio = along**2 + 2.0 * across**2, along * across**2
+        squared, ratio = _squared(*stretches), math.prod(stretches)
         shear = 0.5 * own * ((squared - 3.0) - np.log(squared + 1.0))
         return float(shear + 0.5 * volume * (ratio - 1.0 - 0.75 * own / volume) ** 2)
 
-    def stiffening(along: float, across: float) -> float:
-        ratio = along * across**2
-        q = along**2 + 2.0 * across**2 - 1.0 - 2.0 * ratio
+    def stiffening(*stretches: float) -> float:
+        ratio = math.prod(stretches)
+        q = _squared(*stretches) - 1.0 - 2.0 * ratio
         return float(
             0.5 * mu * _stretch_energy(material.law, q) + 0.5 * (lam + mu) * (ratio - 1.0) ** 2
         )
 
     return stiffening if material.stiffens else stable_neo_hookean
+
+
+def _squared(*stretches: float) -> float:
+    """Return the sum of the squares."""
+    return sum(stretch**2 for stretch in stretches)
 
 
 def _stretch_energy(law: Law, q: float) -> float:
@@ -92,11 +98,12 @@ def uniaxial(material: Material, stretches: FloatArray) -> UniaxialStretch:
     energy, h = energy_of(material), 1e-5
 
     def slope_across(across: float, along: float) -> float:
-        return (energy(along, across + h) - energy(along, across - h)) / (2.0 * h)
+        wide, narrow = across + h, across - h
+        return (energy(along, wide, wide) - energy(along, narrow, narrow)) / (2.0 * h)
 
     widths = [float(brentq(slope_across, 0.3, 1.2, args=(along,))) for along in stretches]
     stresses = [
-        (energy(along + h, width) - energy(along - h, width)) / (2.0 * h)
+        (energy(along + h, width, width) - energy(along - h, width, width)) / (2.0 * h)
         for along, width in zip(stretches.tolist(), widths, strict=True)
     ]
     return UniaxialStretch(stretches, np.array(stresses), np.array(widths))

@@ -14,7 +14,7 @@ from scalpel_sim.scene.case import ExpectedTable, read_case
 from scalpel_sim.validate.cases.expected import check_expected, read_curve
 from scalpel_sim.validate.cases.runner import CaseRecord, TimeTable, assemble, run_case
 from scalpel_sim.validate.findings import FAIL, PASS
-from tissue import Energies
+from tissue import MATERIALS, Energies
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 
@@ -69,6 +69,32 @@ def test_a_blade_cuts_a_block_with_toughness_times_thickness(tmp_path, capsys):
     # What the blade pushes forward, the sides hold back.
     sides, blade = table["on_the_sides_n"][steady].mean(), table["cutting_force_n"][steady].mean()
     assert sides == pytest.approx(blade, rel=0.1)
+
+
+def test_a_wire_through_gelatin_weighs_what_kitchen_scales_would_show(tmp_path):
+    case = EXAMPLES / "gelatin_cut.toml"
+    assert command_line(["validate", "--case", str(case), "--out", str(tmp_path), "-q"]) == 0
+    table = columns(tmp_path / "case.csv")
+    deep = (table["time_s"] >= 1.2) & (table["time_s"] <= 2.2)
+    wire, scales = table["wire_n"][deep], table["scales_n"][deep]
+    # The wire in a hand weighs on the scales: both are the same force, but for the block's motion.
+    assert scales.mean() == pytest.approx(wire.mean(), rel=0.02)
+    gelatin = MATERIALS["gelatin"].material
+    faster = (10e-3 / gelatin.toughness_speed) ** gelatin.toughness_exponent
+    assert wire.mean() == pytest.approx(gelatin.toughness * (1.0 + faster) * 20e-3, rel=0.05)
+
+
+def test_pressed_gelatin_is_as_stiff_as_its_own_figure_says(tmp_path):
+    forces = []
+    for young in ("18.3e3", "36.6e3"):
+        path = tmp_path / f"press{young}.toml"
+        text = (EXAMPLES / "gelatin_press.toml").read_text(encoding="utf-8")
+        path.write_text(text.replace("18.3e3", young), encoding="utf-8")
+        assert command_line(["validate", "--case", str(path), "--out", str(tmp_path), "-q"]) == 0
+        forces.append(columns(tmp_path / "case.csv")["force_n"][-1])
+    assert forces[1] == pytest.approx(2.0 * forces[0], rel=0.01)
+    # A cube between plates that hold it: stiffer than one between plates that slip.
+    assert 1.1 < forces[0] / (18.3e3 * 0.04**2 * 0.1) < 1.5
 
 
 def test_a_case_that_misses_what_it_expects_ends_with_exit_code_3(tmp_path, capsys):
