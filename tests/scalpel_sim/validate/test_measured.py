@@ -80,6 +80,12 @@ def test_a_bar_sags_as_measured_under_a_load_that_it_was_not_fitted_to():
     assert [check.verdict for check in checks] == [FAIL, FAIL, FAIL]
 
 
+def test_the_bar_sags_as_a_solid_of_linear_elasticity():
+    rest = silicone_bar.height_at_rest(0.0)
+    assert silicone_bar.check_solid(rest).verdict == PASS
+    assert silicone_bar.check_solid(0.95 * rest).verdict == FAIL
+
+
 def test_the_inertia_of_a_weight_slows_the_swing_as_a_mass_on_a_spring():
     intervals = []
     for take in silicone_bar.TAKES[:2]:
