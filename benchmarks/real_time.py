@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.runs.run import run_time
-from scalpel_sim.scene.checks import can_audit
+from scalpel_sim.scene.checks import moves_together
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import Scene, changed, material_called
 from scalpel_sim.simulation import Simulation
@@ -136,7 +136,7 @@ def _scene(name: str, material: str) -> Scene:
 def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
     """Do the stroke of a scene once."""
     scene = _scene(case.scene, case.material)
-    audit = case.what == "account" and can_audit(scene.solver.relaxation)
+    audit = case.what == "account" and moves_together(scene.solver.relaxation)
     simulation = prepare(changed(scene, audit=audit))
     n_tetrahedra = simulation.link.describe().n_tetrahedra
     substeps: list[int] = []

@@ -32,8 +32,9 @@ class SolverSettings:
     """How closely cuts follow the blade, where the scheme lets one choose."""
     relaxation: str | IntegratorOptions = "global"
     """How the motion is advanced: `global`, all nodes together by a Runge-Kutta-Nystroem method;
-    `verlet`, all nodes by position Verlet, up to 1.5 times as fast; `hierarchical`, the paper's; or
-    one of their classes with settings."""
+    `verlet`, all nodes by position Verlet, up to 1.5 times as fast; `hierarchical`, near the blade
+    more often; `paper`, the same as printed, with nodes far from the blade that do not move; or one
+    of their classes with settings."""
     mass_scaling: float | None = MASS_SCALING_FREQUENCY
     """Angular frequency [1/s] above which nodes get mass: those of slivers that a cut has left, and
     those that strain or the blade makes as fast, so that a few nodes do not set the time step;

@@ -367,3 +367,8 @@ class SchemeStatistics(NamedTuple):
     """Tetrahedra that the blade is still in, or was when it was last seen."""
     n_ignored_crossings: int
     """Crossings of edges of tetrahedra that were split already: each is processed only once."""
+    n_local_searches: int
+    """Steps in which the point of the blade was in the tetrahedron of the step before, or in a
+    neighbour of it."""
+    n_global_searches: int
+    """Steps in which the whole body was searched for the blade."""

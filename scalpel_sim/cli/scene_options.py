@@ -15,7 +15,7 @@ from scalpel_sim.cli.options import (
 )
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.blade import expect_faces
-from scalpel_sim.scene.checks import can_audit
+from scalpel_sim.scene.checks import moves_together
 from scalpel_sim.scene.read import (
     DEFAULT_SCENE,
     Given,
@@ -84,7 +84,7 @@ def chosen_scene(
     if relaxation is not None and "relaxation" not in solver and not scene.material.stiffens:
         how["relaxation"] = relaxation
     if audits and "audit" not in solver:
-        how["audit"] = can_audit(how.get("relaxation", scene.solver.relaxation))
+        how["audit"] = moves_together(how.get("relaxation", scene.solver.relaxation))
     return changed(scene, **how)
 
 

@@ -120,12 +120,12 @@ def _sets(names: Sequence[str | None], tissue: TissueOptions) -> list["KernelSet
     """
     from scalpel_sim.cli.scene_options import chosen_scene
     from scalpel_sim.runs.warm_up import KernelSet
-    from scalpel_sim.scene.checks import can_audit
+    from scalpel_sim.scene.checks import moves_together
 
     found: dict[KernelSet, None] = {}
     for name in names:
         scene = chosen_scene(name, tissue)
-        audits = (True, False) if can_audit(scene.solver.relaxation) else (False,)
+        audits = (True, False) if moves_together(scene.solver.relaxation) else (False,)
         audit = vars(tissue.solver)["audit"]
         if audit is not None:
             audits = (audit,)

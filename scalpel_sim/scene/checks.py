@@ -48,8 +48,8 @@ _OF_MODEL = ("at", "pos", "quat")
 _OF_HOLD = ("stiffness", "damping", "breaks_at", "closed")
 
 
-def can_audit(relaxation: str) -> bool:
-    """Return whether an energy account can be kept: where all nodes move together."""
+def moves_together(relaxation: str) -> bool:
+    """Return whether all nodes move together: so on threads, and with an account of energy."""
     return relaxation in ("global", "verlet")
 
 
@@ -74,7 +74,7 @@ def check_solver(solver: SolverTable, material: Material) -> None:
     check_choice("relaxation", relaxation, tuple(RELAXATIONS))
     check_choice("element", solver.element, ELEMENTS)
     check_choice("precision", solver.precision, PRECISIONS)
-    if threads != 1 and relaxation == "hierarchical":
+    if threads != 1 and not moves_together(relaxation):
         raise UsageError(
             f"--threads {threads} is for --relaxation global or verlet; {relaxation} runs on one"
         )
@@ -83,7 +83,7 @@ def check_solver(solver: SolverTable, material: Material) -> None:
         raise UsageError(
             f"--threads is {threads}; it must be from 1 to {cores}, the number of cores"
         )
-    if solver.audit and not can_audit(relaxation):
+    if solver.audit and not moves_together(relaxation):
         raise UsageError(
             f"--audit needs --relaxation global or verlet, not {relaxation}; omit "
             "--audit, or choose one of those"

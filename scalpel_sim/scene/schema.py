@@ -156,7 +156,8 @@ class SolverTable(TomlTable, kw_only=True, frozen=True):
     relaxation: Text = "global"
     """How the motion is advanced: global, all nodes together by the Runge-Kutta method [default of
     run]; verlet, the same by a method of second order, up to 1.5 times as fast [default of
-    view]; or hierarchical, the paper's, for springs."""
+    view]; or, for springs, hierarchical, near the blade more often, or paper, the same as
+    printed: far from the blade nothing moves."""
     mass_scaling: NotNegative = DEFAULT_MASS_SCALING
     """Light nodes, of slivers or near the blade, get mass until none is faster than this angular
     frequency [1/s; 0: off]. The added mass has no weight, and the table says how much it is."""

@@ -72,7 +72,7 @@ def _visit(cut: Cut, t: int, epoch: int, is_seed: bool) -> None:
         cut.change.lacks_room = LISTS
         return
     visits.tetrahedra[t] = epoch
-    if _note_segments(cut, t, n) or is_seed:
+    if note_segments(cut, t, n) or is_seed:
         scratch.active[n] = t
         scratch.n_active = n + 1
 
@@ -126,7 +126,7 @@ def _visit_star(cut: Cut, node: int, epoch: int) -> None:
 
 
 @kernel
-def _note_segments(cut: Cut, t: int, n: int) -> bool:
+def note_segments(cut: Cut, t: int, n: int) -> bool:
     """List the segments whose boxes overlap that of tetrahedron `t`; return whether any does."""
     body, path, segments = cut.body, cut.path, cut.scratch.segments
     box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)

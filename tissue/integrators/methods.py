@@ -148,7 +148,7 @@ class Hierarchical:
     updates: int = 64
     """I: steps that the nodes at the tip of the blade, and those along its edge that it holds, take
     in a frame. Where the steps of a ring would be too long for its stiffest node, it takes twice as
-    many, or four times, and so on."""
+    many, or four times, and so on; a frame that takes `updates` steps is as printed."""
     rings: int = 6
     """Number s_max of the last ring; nodes of ring s, s edges from the tip, take I 2^-s steps."""
     far: Far = "moved"
@@ -174,8 +174,10 @@ RELAXATIONS: dict[str, IntegratorOptions] = {
     "global": Global(),
     "verlet": Verlet(),
     "hierarchical": Hierarchical(),
+    "paper": Hierarchical(far="frozen"),
 }
-"""Names of relaxations, with the integrators that they stand for in their default settings."""
+"""Names of relaxations, with the integrators that they stand for in their default settings; `paper`
+is the hierarchy as printed."""
 
 
 def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> IntegratorOptions:

@@ -185,7 +185,7 @@ def _checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpt
         )
     if solver.threads > 1 and not isinstance(options, Global | Verlet):
         raise ValueError(
-            f"threads is {solver.threads}; relaxation='hierarchical' runs on one. Use threads=1, "
+            f"threads is {solver.threads}; a hierarchical relaxation runs on one. Use threads=1, "
             "or relaxation='global' or 'verlet'"
         )
     for name, choices in (("element", ELEMENTS), ("precision", PRECISIONS)):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from scalpel_sim.preparation.prepare import prepare
-from scalpel_sim.scene.checks import can_audit
+from scalpel_sim.scene.checks import moves_together
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.simulation import Simulation, no_garbage_collection
@@ -51,7 +51,7 @@ class ReferenceFrames:
 
 def as_run(scene: Scene) -> Scene:
     """Return a scene as `run` does it: with an account of the energy, where one can be kept."""
-    return changed(scene, audit=can_audit(scene.solver.relaxation))
+    return changed(scene, audit=moves_together(scene.solver.relaxation))
 
 
 def processor_time(simulation: Simulation, n_frames: int) -> float:

@@ -44,7 +44,12 @@ def test_a_choice_and_a_law_stand_for_one_method(choice, law, name):
 
 @pytest.mark.parametrize(
     ("name", "settings"),
-    [("global", Global()), ("verlet", Verlet()), ("hierarchical", Hierarchical())],
+    [
+        ("global", Global()),
+        ("verlet", Verlet()),
+        ("hierarchical", Hierarchical()),
+        ("paper", Hierarchical(updates=64, rings=6, far="frozen")),
+    ],
 )
 def test_a_name_stands_for_the_default_settings(name, settings):
     assert checked_relaxation(name, SPRINGS) == settings

@@ -43,6 +43,10 @@ class Records(Arrays):
     """First edge whose lower end is each node, shape (n_nodes + 1,)."""
     faces: IntArray
     """Corners of each face, ascending, shape (n_faces, 3)."""
+    first_around: IntArray
+    """Where each edge's tetrahedra begin in `around`, shape (n_edges + 1,)."""
+    around: IntArray
+    """The tetrahedra around each edge, shape (6 n_tets,)."""
     crossed_at: FloatArray = sized("edges", fill=NOT_CUT)
     """Fraction from its first end at which the blade crossed each edge, or NOT_CUT; (n_edges,)."""
     crossed_in: IntArray = sized("edges")
@@ -96,6 +100,7 @@ def records_of(body: Body) -> Records:
     tetrahedra = body.tetrahedra[:n_tetrahedra].copy()
     ends = np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
     edges, edges_of = np.unique(ends, axis=0, return_inverse=True)
+    edges_of = edges_of.reshape(n_tetrahedra, 6).astype(np.int64)
     sorting = sorted_faces(tetrahedra)
     first = sorting.halves[sorting.starts]
     faces = np.sort(tetrahedra[first[:, None] // 4, np.array(FACES)[first % 4]], axis=1)
@@ -106,10 +111,12 @@ def records_of(body: Body) -> Records:
         sizes,
         tetrahedra=tetrahedra,
         links=body.links[:n_tetrahedra].copy(),
-        edges_of=edges_of.reshape(n_tetrahedra, 6).astype(np.int64),
+        edges_of=edges_of,
         faces_of=faces_of.reshape(n_tetrahedra, 4),
         edges=np.ascontiguousarray(edges),
         first_edge=np.searchsorted(edges[:, 0], np.arange(n_nodes + 1)).astype(np.int64),
+        first_around=np.append(0, np.cumsum(np.bincount(edges_of.ravel()))).astype(np.int64),
+        around=np.argsort(edges_of.ravel(), kind="stable") // 6,
         faces=np.ascontiguousarray(faces),
         incision=1,
     )

@@ -11,6 +11,11 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
+from tissue.cutting.bielser_1998.active_tetrahedra import (
+    IN_NONE,
+    Search,
+    detect_along_line,
+)
 from tissue.cutting.bielser_1998.case_table import CASES
 from tissue.cutting.bielser_1998.mesh_records import (
     NO_NODE,
@@ -22,7 +27,6 @@ from tissue.cutting.bielser_1998.mesh_records import (
     edge_between,
     is_whole,
     records_of,
-    reference_at_face,
     table,
 )
 from tissue.cutting.bielser_1998.node_placement import Placing
@@ -30,9 +34,8 @@ from tissue.cutting.bielser_1998.subdivision import Split, SplitCounts, split_te
 from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN, N_LOCAL_NODES, bit_of
 from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
-from tissue.cutting.collision_detection import detect_collisions
-from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, line_of_sample, next_event
 from tissue.cutting.workspace import Cut, Scheme, SnapLimits
+from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
 from tissue.mesh.body import Body
 from tissue.mesh.changes import clear_changes
 from tissue.mesh.nonconforming import HANGING
@@ -78,13 +81,14 @@ class PaperScheme(Scheme):
         self._records = records_of(body)
         self._table = table()
         self._waiting = Waiting.new({"tetrahedra": len(self._records.tetrahedra)})
+        self._search = Search.new({}, point=IN_NONE)
         self._placing = Placing.new({})
         self._references = np.zeros((5, N_LOCAL_NODES), np.int64)
         self._counts = SplitCounts.new({})
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
-        detect_collisions(self._arrays(body, visits, path))
+        detect_along_line(self._arrays(body, visits, path), self._records, self._search)
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """Record what was detected, and split the tetrahedra that the blade has left: one pass."""
@@ -92,11 +96,15 @@ class PaperScheme(Scheme):
         is_first_pass = self.change.is_full == 0
         clear_changes(self.change)
         if is_first_pass:
-            self._counts.n_ignored += record_crossings(cut, self._records)
-            record_tips(cut, self._records)
-            list_waiting(cut, self._records, self._waiting)
+            self._counts.n_ignored += record_crossings(cut, self._records, self._waiting)
+            record_tips(cut, self._records, self._search)
         split_left(self._split(body), self._waiting, path, self._reach)
         remember_active(cut)
+
+    def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
+        """Cut nothing; the tetrahedra around the edge, which rests, are those active before."""
+        super().cut_to_edge(body, visits, path)
+        remember_active(self._arrays(body, visits, path))
 
     def end(self, body: Body, visits: Visits, path: Path) -> None:
         """Split the tetrahedra that wait for the blade to leave, in one pass."""
@@ -109,10 +117,12 @@ class PaperScheme(Scheme):
         """Forget the incision. Its edges stay cut: each tetrahedron is processed once."""
         super().forget()
         self._records.incision += 1
+        self._search.point = IN_NONE
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return counts of what was done so far."""
-        return statistics(body, self._records, self._table, self._waiting, self._counts)
+        did = (self._waiting, self._counts, self._search)
+        return statistics(body, self._records, self._table, *did)
 
     def _split(self, body: Body) -> Split:
         return Split(
@@ -150,7 +160,7 @@ def split_left(s: Split, waiting: Waiting, path: Path, reach: float) -> None:
 
 
 @kernel
-def record_crossings(cut: Cut, records: Records) -> int:
+def record_crossings(cut: Cut, records: Records, waiting: Waiting) -> int:
     """Record the crossed edges of the initial mesh; return how many others were crossed.
 
     Others are ignored: "each tetrahedron can only be processed once" (section 6). An edge that is
@@ -166,51 +176,56 @@ def record_crossings(cut: Cut, records: Records) -> int:
         elif records.crossed_at[e] == NOT_CUT:
             records.crossed_at[e] = scratch.crossing_at[i, 0]
             records.crossed_in[e] = records.incision
+            _list_waiting(records, waiting, e)
         elif records.crossed_in[e] == records.incision and records.edge_nodes[e, 0] == NO_NODE:
             records.crossed_at[e] = NOT_CUT
     return n_ignored
 
 
 @kernel
-def record_tips(cut: Cut, records: Records) -> None:
+def _list_waiting(records: Records, waiting: Waiting, e: int) -> None:
+    """Add the whole tetrahedra around a cut edge to the waiting ones."""
+    for i in range(records.first_around[e], records.first_around[e + 1]):
+        t = records.around[i]
+        if is_whole(records, t) and waiting.is_listed[t] == 0:
+            waiting.is_listed[t] = 1
+            waiting.tetrahedra[waiting.n_listed] = t
+            waiting.n_listed += 1
+
+
+@kernel
+def record_tips(cut: Cut, records: Records, search: Search) -> None:
     """Record where the ends of the blade passed through faces of whole tetrahedra."""
     last = len(cut.path.seed) - 1
     for end in range(2):
         sample = 0 if end == 0 else last
         if cut.path.member[sample]:
-            _record_tip(cut, records, sample)
+            _record_tip(cut, records, search.n_swept, sample)
 
 
 @kernel
-def _record_tip(cut: Cut, records: Records, sample: int) -> None:
-    line = line_of_sample(cut.path, sample)
-    when = 0.0
-    for _ in range(MOST_EVENTS):
-        event = next_event(cut, line, when)
-        if event.when > 1.0:
-            return
-        when = event.when + PARAMETER_GAP
-        t = event.half // 4
+def _record_tip(cut: Cut, records: Records, n_swept: int, sample: int) -> None:
+    """Record the faces of the tetrahedra that were or are active through which a sample passed."""
+    body, path = cut.body, cut.path
+    start, stop = lattice_point(path.lattice_t0, sample), lattice_point(path.lattice_t1, sample)
+    for i in range(n_swept):
+        t = cut.scratch.active[i]
         if not is_whole(records, t):
             continue
-        face = records.faces_of[t, event.half % 4]
-        total = max(event.weights.x, 0.0) + max(event.weights.y, 0.0) + max(event.weights.z, 0.0)
-        for c in range(3):
-            node = event.a if c == 0 else (event.b if c == 1 else event.c)
-            place = reference_at_face(records, face, node)
-            records.tip_weights[face, place] = max(event.weights[c], 0.0) / total
-
-
-@kernel
-def list_waiting(cut: Cut, records: Records, waiting: Waiting) -> None:
-    """Add the active tetrahedra of which the blade has cut an edge to the waiting ones."""
-    scratch = cut.scratch
-    for i in range(scratch.n_active):
-        t = scratch.active[i]
-        if is_whole(records, t) and waiting.is_listed[t] == 0 and cut_edge_code(records, t) != 0:
-            waiting.is_listed[t] = 1
-            waiting.tetrahedra[waiting.n_listed] = t
-            waiting.n_listed += 1
+        for f in range(4):
+            face = records.faces_of[t, f]
+            a = lattice_point(body.lattice_rest, records.faces[face, 0])
+            b = lattice_point(body.lattice_rest, records.faces[face, 1])
+            c = lattice_point(body.lattice_rest, records.faces[face, 2])
+            if not pierces(start, stop, a, b, c):
+                continue
+            of_a = abs(float(orient3d(start, stop, b, c)))
+            of_b = abs(float(orient3d(start, stop, c, a)))
+            of_c = abs(float(orient3d(start, stop, a, b)))
+            total = of_a + of_b + of_c
+            records.tip_weights[face, 0] = of_a / total
+            records.tip_weights[face, 1] = of_b / total
+            records.tip_weights[face, 2] = of_c / total
 
 
 @kernel
@@ -238,7 +253,12 @@ def has_left(body: Body, path: Path, t: int, reach: float) -> bool:
 
 
 def statistics(
-    body: Body, records: Records, table: Table, waiting: Waiting, counts: SplitCounts
+    body: Body,
+    records: Records,
+    table: Table,
+    waiting: Waiting,
+    counts: SplitCounts,
+    search: Search,
 ) -> SchemeStatistics:
     """Return what the scheme did so far and what it left behind, in O(initial mesh).
 
@@ -248,6 +268,7 @@ def statistics(
         table: The lookup table.
         waiting: Tetrahedra that the blade has not left.
         counts: Counts since the body was made.
+        search: Search for the point of the blade.
     """
     is_split = records.first_child != WHOLE_STILL
     codes = np.zeros(len(is_split), np.int64)
@@ -271,4 +292,6 @@ def statistics(
         n_unsupported=int(unsupported.sum()),
         n_waiting=waiting.n_listed,
         n_ignored_crossings=counts.n_ignored,
+        n_local_searches=search.n_local,
+        n_global_searches=search.n_global,
     )
