@@ -9,6 +9,8 @@ from tests.support import bodies, strokes
 from tests.support.materials import SPRINGS
 from tests.system.energy.test_conservation import NO_GRAVITY, SLAB
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block
+from tissue.integrators.bielser_1998 import stepper
+from tissue.integrators.bielser_1998.stepper import ring_steps
 
 HIERARCHICAL = Hierarchical(updates=16, rings=3)
 
@@ -108,3 +110,32 @@ def test_a_cut_between_fixed_nodes_creates_no_false_contacts():
     speed = np.linalg.norm(tissue.snapshot().velocities, axis=1).max()
     assert speed < 0.05
     assert max(r.body_contacts.penetration for r in results) < 1e-3
+
+
+def test_in_the_paper_s_block_every_ring_takes_the_steps_of_equation_7(monkeypatch):
+    """A cut by the paper's scheme and relaxation: I 2^-s steps, none more for stability."""
+    taken = set()
+
+    def noted(options, needed):
+        n, every = ring_steps(options, needed)
+        taken.add((options.updates, *(n // every).tolist()))
+        return n, every
+
+    monkeypatch.setattr(stepper, "ring_steps", noted)
+    mesh = block((4, 6, 4), (0.04, 0.06, 0.04))
+    solver = SolverSettings(scheme="paper", relaxation="paper")
+    tissue = Tissue(mesh, SPRINGS, fixed=bodies.sides(mesh), solver=solver)
+    strokes.make(tissue, strokes.upright(0.0152, -0.005, 0.08, 0.012, 0.045))
+    assert tissue.scheme_statistics().n_cut > 100
+    assert taken == {(64, 64, 32, 16, 8, 4, 2, 1)}  # the last ones are frozen
+
+
+def test_with_the_paper_s_relaxation_nodes_far_from_the_blade_stay_where_they_are():
+    mesh = block((2, 12, 2), (0.02, 0.12, 0.02))
+    solver = SolverSettings(relaxation="paper")
+    tissue = Tissue(mesh, SPRINGS, fixed=bodies.sides(mesh), solver=solver)
+    before = tissue.snapshot().positions
+    strokes.make(tissue, strokes.upright(0.0077, -0.005, 0.005, 0.01, 0.03))
+    moved = np.abs(tissue.snapshot().positions[: len(before)] - before).max(axis=1) > 0.0
+    assert moved[mesh.positions[:, 1] < 0.015].any()
+    assert not moved[mesh.positions[:, 1] > 0.1].any()

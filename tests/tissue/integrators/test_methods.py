@@ -48,7 +48,7 @@ def test_a_choice_and_a_law_stand_for_one_method(choice, law, name):
         ("global", Global()),
         ("verlet", Verlet()),
         ("hierarchical", Hierarchical()),
-        ("paper", Hierarchical(updates=64, rings=6, far="frozen")),
+        ("paper", Hierarchical(updates=64, rings=5, far="frozen")),
     ],
 )
 def test_a_name_stands_for_the_default_settings(name, settings):

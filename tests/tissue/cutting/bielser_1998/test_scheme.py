@@ -201,6 +201,16 @@ def test_a_tetrahedron_is_split_once_the_blade_has_left_it():
     assert tissue.scheme_statistics().n_waiting > 0
 
 
+def test_the_point_is_nearly_always_where_it_was_or_next_door():
+    """Section 3: "high hit rates"; here of a blade that tissue holds, in steps of 1 ms."""
+    mesh = block_of(4, 6, 4)
+    tissue = uncut(mesh, fixed=bodies.sides(mesh))
+    strokes.make(tissue, strokes.upright(0.0152, -0.005, 0.08, 0.012, 0.045))
+    statistics = tissue.scheme_statistics()
+    assert statistics.n_local_searches > 100
+    assert 0 < statistics.n_global_searches < 0.1 * statistics.n_local_searches
+
+
 def test_springs_and_masses_are_those_of_the_split_mesh():
     """Each existing edge has a spring; an uncut neighbour keeps its long edges."""
     mesh = block_of(2, 2, 2)
