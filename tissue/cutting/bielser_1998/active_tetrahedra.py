@@ -4,19 +4,19 @@ In each step: the tetrahedron that holds the point of the blade, searched where 
 and only then in the whole body; from there the tetrahedra that the line passes through, neighbour
 by neighbour; and the edges that the line has swept over.
 
-Where the paper has nothing to say, two things are added. The edges are those of the tetrahedra that
-were active and of those that are: a line that enters through the skin side on had none before it.
-And where the line goes on behind an old cut or in another sheet, to which no face leads, the trace
-goes on in the tetrahedra that the edge holds there.
+Where the paper has nothing to say, two things are added. It looks for edges in the tetrahedra that
+were active, in steps so small that the line passes through no others; a step that begins outside
+the skin is longer, so here they are those that the line has passed through at any instant of the
+step. And where the line goes on behind an old cut or in another sheet, to which no face leads, the
+trace goes on in the tetrahedra that the edge holds there.
 """
 
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
-from tissue.cutting.bielser_1998.mesh_records import Records, is_whole
 from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.collision_detection import find_crossings, note_segments
 from tissue.cutting.workspace import Cut
-from tissue.geometry.exact_predicates import LatticePoint, lattice_point, orient3d
+from tissue.geometry.exact_predicates import LatticePoint, lattice_point, orient3d, pierces
 from tissue.mesh.body import Body, behind, n_behind
 from tissue.mesh.changes import LISTS
 
@@ -34,7 +34,7 @@ class Search(Arrays):
     point: IntCell
     """The active point tetrahedron, or IN_NONE."""
     n_swept: IntCell
-    """Number of tetrahedra that are active or were so in the step before: the first of
+    """Number of tetrahedra that the line has passed through in this step: the first of
     `CutScratch.active`, those that are active at their head."""
     n_local: IntCell
     """Steps in which the point was where it was before, or next door."""
@@ -43,17 +43,14 @@ class Search(Arrays):
 
 
 @kernel
-def detect_along_line(cut: Cut, records: Records, search: Search) -> None:
+def detect_along_line(cut: Cut, search: Search) -> None:
     """Find the active tetrahedra, and the edges that the line has swept over in this step."""
-    scratch = cut.scratch
     put_on_lattice(cut.path, cut.body.lattice)
     find_point(cut, search)
     trace_line(cut, search)
-    n_active = scratch.n_active
-    _append_old(cut, records)
     find_crossings(cut)
-    search.n_swept = scratch.n_active
-    scratch.n_active = n_active
+    search.n_swept = cut.scratch.n_active
+    _keep_active(cut)
 
 
 @kernel
@@ -93,12 +90,14 @@ def _beside(body: Body, t: int, p: LatticePoint) -> int:
 
 @kernel
 def trace_line(cut: Cut, search: Search) -> None:
-    """List the tetrahedra that the line passes through: buildNewActiveTetrahedraList."""
-    body, path, scratch, visits = cut.body, cut.path, cut.scratch, cut.visits
-    visits.epoch += 1
+    """List the tetrahedra that the line has passed through: buildNewActiveTetrahedraList."""
+    body, path, scratch = cut.body, cut.path, cut.scratch
+    cut.visits.epoch += 1
     scratch.n_active = 0
     if search.point != IN_NONE:
         _follow(cut, search.point)
+    for i in range(scratch.n_previous):
+        _follow(cut, scratch.previous[i])
     for k in range(len(path.seed)):
         if path.seed[k] >= 0:
             _follow(cut, path.seed[k])
@@ -110,7 +109,7 @@ def trace_line(cut: Cut, search: Search) -> None:
 
 @kernel
 def _follow(cut: Cut, start: int) -> None:
-    """List `start` if the line passes through it, and all that it passes through from there."""
+    """List `start` if the line has passed through it, and all that it passed through from there."""
     body, scratch = cut.body, cut.scratch
     i = scratch.n_active
     _visit(cut, start)
@@ -125,43 +124,68 @@ def _follow(cut: Cut, start: int) -> None:
 
 @kernel
 def _visit(cut: Cut, t: int) -> None:
-    """List tetrahedron `t`, once, if the line passes through it at the end of the step."""
-    body, path, visits = cut.body, cut.path, cut.visits
+    """List tetrahedron `t`, once, if the line has passed through it in this step."""
+    scratch, visits = cut.scratch, cut.visits
     if visits.tetrahedra[t] == visits.epoch:
         return
     visits.tetrahedra[t] = visits.epoch
-    n = cut.scratch.n_active
-    if n == len(cut.scratch.active):
+    n = scratch.n_active
+    if n == len(scratch.active):
         cut.change.lacks_room = LISTS
-        return
-    if not note_segments(cut, t, n):
-        return
-    for k in range(cut.scratch.segments[n, 0], cut.scratch.segments[n, 1] + 1):
-        a, b = lattice_point(path.lattice_t1, k), lattice_point(path.lattice_t1, k + 1)
-        if path.linked[k] and meets(body, t, a, b):
-            cut.scratch.active[n] = t
-            cut.scratch.n_active = n + 1
-            return
+    elif note_segments(cut, t, n) and _is_swept(cut, t, n):
+        scratch.active[n] = t
+        scratch.n_active = n + 1
 
 
 @kernel
-def _append_old(cut: Cut, records: Records) -> None:
-    """Append those that were active in the step before, and are still whole, to the list."""
-    scratch, visits = cut.scratch, cut.visits
-    visits.epoch += 1
+def _keep_active(cut: Cut) -> None:
+    """Bring the tetrahedra that the line passes through now to the head, and count them alone."""
+    scratch = cut.scratch
+    n = 0
     for i in range(scratch.n_active):
-        visits.tetrahedra[scratch.active[i]] = visits.epoch
-    for i in range(scratch.n_previous):
-        t, n = scratch.previous[i], scratch.n_active
-        if visits.tetrahedra[t] == visits.epoch or not is_whole(records, t):
+        if _is_active(cut, scratch.active[i], i):
+            scratch.active[n], scratch.active[i] = scratch.active[i], scratch.active[n]
+            n += 1
+    scratch.n_active = n
+
+
+@kernel
+def _is_active(cut: Cut, t: int, i: int) -> bool:
+    """Return whether the line passes through `t`, at place `i` of the list, after the step."""
+    path, segments = cut.path, cut.scratch.segments
+    for k in range(segments[i, 0], segments[i, 1] + 1):
+        a, b = lattice_point(path.lattice_t1, k), lattice_point(path.lattice_t1, k + 1)
+        if path.linked[k] and meets(cut.body, t, a, b):
+            return True
+    return False
+
+
+@kernel
+def _is_swept(cut: Cut, t: int, place: int) -> bool:
+    """Return whether the line has passed through `t`, at a place of the list, in this step.
+
+    Then a side of the swept surface enters the tetrahedron, or an edge of it pierces the surface.
+    """
+    body, path, segments = cut.body, cut.path, cut.scratch.segments
+    for k in range(segments[place, 0], segments[place, 1] + 1):
+        a0, b0 = lattice_point(path.lattice_t0, k), lattice_point(path.lattice_t0, k + 1)
+        a1, b1 = lattice_point(path.lattice_t1, k), lattice_point(path.lattice_t1, k + 1)
+        if not path.linked[k]:
             continue
-        visits.tetrahedra[t] = visits.epoch
-        if n == len(scratch.active):
-            cut.change.lacks_room = LISTS
-            return
-        note_segments(cut, t, n)
-        scratch.active[n] = t
-        scratch.n_active = n + 1
+        if (
+            meets(body, t, a1, b1)
+            or meets(body, t, a0, b0)
+            or meets(body, t, a0, a1)
+            or meets(body, t, b0, b1)
+        ):
+            return True
+        for i in range(3):
+            for j in range(i + 1, 4):
+                p = lattice_point(body.lattice_rest, body.tetrahedra[t, i])
+                q = lattice_point(body.lattice_rest, body.tetrahedra[t, j])
+                if pierces(p, q, a0, a1, b1) or pierces(p, q, a0, b1, b0):
+                    return True
+    return False
 
 
 @kernel

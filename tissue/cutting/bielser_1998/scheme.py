@@ -88,7 +88,7 @@ class PaperScheme(Scheme):
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
-        detect_along_line(self._arrays(body, visits, path), self._records, self._search)
+        detect_along_line(self._arrays(body, visits, path), self._search)
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """Record what was detected, and split the tetrahedra that the blade has left: one pass."""
@@ -100,11 +100,6 @@ class PaperScheme(Scheme):
             record_tips(cut, self._records, self._search)
         split_left(self._split(body), self._waiting, path, self._reach)
         remember_active(cut)
-
-    def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut nothing; the tetrahedra around the edge, which rests, are those active before."""
-        super().cut_to_edge(body, visits, path)
-        remember_active(self._arrays(body, visits, path))
 
     def end(self, body: Body, visits: Visits, path: Path) -> None:
         """Split the tetrahedra that wait for the blade to leave, in one pass."""
@@ -205,7 +200,7 @@ def record_tips(cut: Cut, records: Records, search: Search) -> None:
 
 @kernel
 def _record_tip(cut: Cut, records: Records, n_swept: int, sample: int) -> None:
-    """Record the faces of the tetrahedra that were or are active through which a sample passed."""
+    """Record the faces of the tetrahedra that the line passed through which a sample passed."""
     body, path = cut.body, cut.path
     start, stop = lattice_point(path.lattice_t0, sample), lattice_point(path.lattice_t1, sample)
     for i in range(n_swept):

@@ -125,7 +125,7 @@ class Kernels:
         path, scratch = self.cut.path, self.cut.scratch
         path.t0[:], path.t1[:] = np.linspace(*before, N_SAMPLES), np.linspace(*now, N_SAMPLES)
         path.seed[:] = holding
-        detect_along_line(self.cut, self.records, self.search)
+        detect_along_line(self.cut, self.search)
         self.cut_edges |= {
             tuple(row) for row in scratch.crossing[: scratch.n_crossings, :2].tolist()
         }
@@ -195,7 +195,7 @@ def test_a_point_that_jumps_is_found_by_the_global_search():
 
 
 def test_a_line_that_enters_side_on_crosses_the_edges_of_the_skin():
-    """The paper has no active tetrahedra then; ours are those of the end of the step."""
+    """The paper has no active tetrahedra then."""
     mesh = MESHES["grid"]
     kernels = Kernels(mesh)
     outside, inside = (np.array([[0.0137, y, 0.0117], [0.0137, y, 0.035]]) for y in (-1e-4, 1e-4))
@@ -212,6 +212,17 @@ def test_a_line_that_enters_side_on_crosses_the_edges_of_the_skin():
                 expected.add((a, b))
     assert kernels.cut_edges == expected
     assert len(expected) == 4
+
+
+def test_a_long_step_crosses_the_edges_that_short_ones_cross():
+    """The old tetrahedra alone do not have them all."""
+    kernels, once = Kernels(MESHES["jittered"]), Kernels(MESHES["jittered"])
+    along = lines(ALONG, OUT)
+    for before, now in itertools.pairwise(along):
+        kernels.step(before, now)
+    once.step(along[0], along[-1])
+    assert once.cut_edges == kernels.cut_edges
+    assert len(once.cut_edges) > 10
 
 
 def test_a_line_goes_on_behind_an_old_cut_where_the_edge_holds_tissue():
