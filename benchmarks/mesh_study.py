@@ -85,7 +85,7 @@ class Model(NamedTuple):
     material: Material
     averaged: bool = True
     """Whether dilatation is averaged over nodes, as in the engine."""
-    element: str = "averaged"
+    element: str = "plain"
     """How tetrahedra are strained (`SolverSettings.element`)."""
     shape: Callable[..., TetrahedralMesh] = block
     """How cells are divided into tetrahedra."""
@@ -100,14 +100,14 @@ def models() -> list[Model]:
         if nu > 0.0:
             locked = Model(f"neo-Hookean, nu {nu}, volume not averaged", material, averaged=False)
             found.append(locked)
-        found.append(Model(f"neo-Hookean, nu {nu}, plain", material, element="plain"))
         found.append(Model(f"neo-Hookean, nu {nu}", material))
+        found.append(Model(f"neo-Hookean, nu {nu}, averaged", material, element="averaged"))
         if nu in ON_LATTICE:
             found += [
                 Model(
                     f"neo-Hookean, nu {nu}, lattice{name}", material, True, element, lattice_block
                 )
-                for name, element in ((", plain", "plain"), ("", "averaged"))
+                for name, element in (("", "plain"), (", averaged", "averaged"))
             ]
     return found
 

@@ -62,7 +62,7 @@ class Elasticity:
         *,
         mass_scaling: float | None = None,
         is_single: bool = False,
-        averages_shear: bool = True,
+        averages_shear: bool = False,
         resists_collapse: bool = True,
     ) -> None:
         self._density, self._spring_modulus = material.density, material.spring_modulus
@@ -74,7 +74,7 @@ class Elasticity:
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
         law = material.law.density(material.moduli)
-        if law is not None and averages_shear and law.mu > 0.0:
+        if law is not None and averages_shear:
             law = averaged_shear(law)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self._may_collapse = law is None and resists_collapse

@@ -20,10 +20,6 @@ the tissue is held. R then stands for the middle of the next increment, which ma
 second order.
 
     c (F - cof F) + s F = F S        S = c (1 - (cof F)^T cof F / J) + s 1
-
-Of the stress P of averaged shear (`tissue.elasticity.averaged_shear`) S is the symmetric part of
-F^-1 P, with the F of the tetrahedron: the rest of it is of second order in the difference of this F
-from those that P is of.
 """
 
 import math
@@ -33,12 +29,11 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import load_block, splat, store_block, width_of
 from tissue.core.simd_rows import larger, where_larger
-from tissue.core.vec3 import Vec3, add, scale
-from tissue.elasticity.averaged_shear import stress_of_nodes
-from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear
+from tissue.core.vec3 import Vec3
+from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid
 from tissue.elasticity.gradients import known_gradient, shape_of
-from tissue.elasticity.neo_hookean import own_dilatation, pressure_of, with_own_pressure
-from tissue.elasticity.stress import MatrixRows, cofactors_of
+from tissue.elasticity.neo_hookean import own_dilatation, pressure_of
+from tissue.elasticity.stress import cofactors_of
 from tissue.laws.kernels import stiffens
 
 SMALLEST_RATIO = 0.1
@@ -116,14 +111,12 @@ def _elastic_stress(solid: Solid, block: int) -> tuple[*_Six, Lanes]:
     v = shape_of(solid, block, VOLUME)
     cx, cy, cz = cofactors_of(x, y, z)
     trace = x.x + y.y + z.z
-    factor = splat(1.0 - law.shear_of_nodes, v) * load_block(
-        solid.stiffening, width_of(solid.shape) * (1 + block)
-    )
+    factor = load_block(solid.stiffening, width_of(solid.shape) * (1 + block))
     if stiffens(law):
         c = splat(law.mu, v) * factor
         s = splat(0.0, v)
     else:
-        c, s = splat(0.75 * law.mu * (1.0 - law.shear_of_nodes), v), factor
+        c, s = splat(0.75 * law.mu, v), factor
     # The columns of K = (tr H) 1 - H^T + cof H:
     a = Vec3(trace - x.x + cx.x, cy.x - x.y, cz.x - x.z)
     b = Vec3(cx.y - y.x, trace - y.y + cy.y, cz.y - y.z)
@@ -141,43 +134,7 @@ def _elastic_stress(solid: Solid, block: int) -> tuple[*_Six, Lanes]:
         splat(-1.0, v) * of_c * _sum_and_product(a.z, d.x, a, d),
         splat(-1.0, v) * of_c * _sum_and_product(a.y, b.x, a, b),
     )
-    if averages_shear(solid):
-        mean, p = stress_of_nodes(solid, block, v)
-        return *_with_mean(own, mean, (a, b, d), inverse), with_own_pressure(solid, block, v, p)
     return *own, pressure_of(solid, block, v)
-
-
-@inlined
-def _with_mean(own: _Six, mean: MatrixRows, columns: MatrixRows, inverse: Lanes) -> _Six:
-    """Return S with the symmetric part of F^-1 P, P a mean of the stresses of nodes.
-
-    Args:
-        own: xx, yy, zz, yz, xz and xy of S [Pa].
-        mean: MatrixRows of P [Pa].
-        columns: Columns of K = cof F - 1.
-        inverse: 1 / J.
-    """
-    xx, yy, zz, yz, xz, xy = own
-    one, half = splat(1.0, inverse), splat(0.5, inverse) * inverse
-    a, b, d = columns
-    px, py, pz = mean
-    # F^-1 P = (cof F)^T P / J: row i of it is column i of cof F times P.
-    a, b, d = Vec3(a.x + one, a.y, a.z), Vec3(b.x, b.y + one, b.z), Vec3(d.x, d.y, d.z + one)
-    rx, ry, rz = _combined(a, px, py, pz), _combined(b, px, py, pz), _combined(d, px, py, pz)
-    return (
-        xx + inverse * rx.x,
-        yy + inverse * ry.y,
-        zz + inverse * rz.z,
-        yz + half * (ry.z + rz.y),
-        xz + half * (rx.z + rz.x),
-        xy + half * (rx.y + ry.x),
-    )
-
-
-@inlined
-def _combined(a: Vec3, x: Vec3, y: Vec3, z: Vec3) -> Vec3:
-    """Return a.x x + a.y y + a.z z."""
-    return add(scale(a.x, x), add(scale(a.y, y), scale(a.z, z)))
 
 
 @inlined

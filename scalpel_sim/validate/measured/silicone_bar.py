@@ -109,7 +109,7 @@ def height_at_rest(load: float, across: int = _ACROSS) -> float:
         _SILICONE,
         fixed=fixed_nodes(mesh, "left"),
         gravity=(0.0, 0.0, -GRAVITY),
-        solver=SolverSettings(relaxation="verlet"),
+        solver=SolverSettings(relaxation="verlet", element="averaged"),
     )
     if load:
         tissue.push(_edge(mesh), (0.0, 0.0, -load))

@@ -79,7 +79,7 @@ def coarse_bar():
 def test_the_bar_sags_as_its_stiffness_matrix_says(coarse_bar):
     material, mesh = bar.bar_material(0.0), bar.bar_mesh(3)
     is_free = np.repeat(~fixed_nodes(mesh, "left"), 3)
-    matrix = stiffness_matrix(mesh, material, averaged=True)[is_free][:, is_free].tocsc()
+    matrix = stiffness_matrix(mesh, material, element="averaged")[is_free][:, is_free].tocsc()
     weight = np.zeros((len(mesh.positions), 3))
     weight[:, 2] = -9.81 * masses(mesh, material.density)
     moved = np.zeros(is_free.size)

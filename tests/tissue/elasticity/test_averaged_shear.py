@@ -12,7 +12,7 @@ import pytest
 from tests.support import bodies
 from tests.support.hexahedra import Hexahedra, solved
 from tests.tissue.solids import LAWS, solid_of
-from tissue import Material, TetrahedralMesh, block, lattice_block
+from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block, lattice_block
 from tissue.elasticity.stiffness_matrix import stiffness_matrix
 
 SOFT = Material(young_modulus=1e5, poisson_ratio=0.45, law="neo_hookean")
@@ -48,7 +48,7 @@ def of_tetrahedra(place, make, cells, material, axis):
     x = mesh.positions[faces]
     areas = np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
     shares = np.bincount(faces.ravel(), np.repeat(areas, 3), len(unit))
-    stiffness = stiffness_matrix(mesh, material)
+    stiffness = stiffness_matrix(mesh, material, element="averaged")
     return deflection(stiffness, unit, mesh.positions, shares / shares.sum(), axis)
 
 
@@ -80,7 +80,7 @@ def test_a_bar_of_three_cells_twists_with_at_most_112_of_saint_venants_torque(ma
     z, arm = mesh.positions[:, 2], mesh.positions - side / 2.0
     turned = np.stack([-angle * arm[:, 1], angle * arm[:, 0], 0.0 * z], axis=1)
     turned[z < 1e-9] = 0.0
-    stiffness = stiffness_matrix(mesh, SOFT)
+    stiffness = stiffness_matrix(mesh, SOFT, element="averaged")
     u = solved(stiffness, (z < 1e-9) | (z > length - 1e-9), turned, np.zeros_like(turned)).ravel()
     torque = u @ (stiffness @ u) / angle
     ratio = torque / (0.1406 * SOFT.mu * side**4 * angle / length)
@@ -100,7 +100,7 @@ def test_a_glued_pad_of_two_layers_at_049_is_pressed_nearly_as_a_solid(make, hig
 
     mesh, solid = make((8, 8, 2), size), Hexahedra((8, 8, 4), lambda unit: unit * np.array(size))
     expected = force(solid.points, solid.stiffness(material.mu, material.lam))
-    found = force(mesh.positions, stiffness_matrix(mesh, material))
+    found = force(mesh.positions, stiffness_matrix(mesh, material, element="averaged"))
     assert 0.98 <= found / expected <= highest
 
 
@@ -112,8 +112,8 @@ def test_no_motion_but_rigid_ones_is_without_energy(seed):
         mesh = bodies.jittered(2, int(random.integers(1 << 30)))
         kept = mesh.tetrahedra[random.permutation(len(mesh.tetrahedra))[: random.integers(4, 48)]]
         for part in (mesh, connected(TetrahedralMesh(mesh.positions, kept))):
-            own = np.linalg.eigvalsh(stiffness_matrix(part, SOFT, element="plain").toarray())
-            found = np.linalg.eigvalsh(stiffness_matrix(part, SOFT).toarray())
+            own = np.linalg.eigvalsh(stiffness_matrix(part, SOFT).toarray())
+            found = np.linalg.eigvalsh(stiffness_matrix(part, SOFT, element="averaged").toarray())
             assert (np.abs(found[:6]) < 1e-9 * found[-1]).all()
             assert found[6] > 0.3 * own[6]
 
@@ -161,3 +161,13 @@ def test_what_is_pressed_flat_resists_by_itself(j):
     squared, k = 2.0 + j * j, law.mu
     by_law = k * (1.0 - 1.0 / (squared + 1.0)) * j - 0.75 * k + law.lam_of_nodes * (j - 1.0)
     assert found / 1e-6 == pytest.approx(by_law - 3.0 * law.shear_modulus * (0.3 - j), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "material",
+    [Material(law="springs"), replace(SOFT, prony=((0.3, 0.1),))],
+    ids=["springs", "prony"],
+)
+def test_a_material_that_cannot_have_averaged_shear_is_refused(material):
+    with pytest.raises(ValueError, match="element is 'averaged', which this material cannot have"):
+        Tissue(block((1, 1, 1), (0.01,) * 3), material, solver=SolverSettings(element="averaged"))

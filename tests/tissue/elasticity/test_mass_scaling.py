@@ -114,7 +114,7 @@ def test_added_mass_changes_no_force_so_that_equilibrium_is_the_same():
 def test_added_mass_keeps_the_sag_to_a_millionth():
     """Drag is strong, so that nothing moves any more; the slit stays open."""
     sags = []
-    for mass_scaling in (0.4 * LOW, None):
+    for mass_scaling in (0.5 * LOW, None):
         tissue = body_of(mass_scaling, viscous_damping=60.0)
         slit = [[(0.0287, y, 0.0123), (0.0287, y, 0.04)] for y in (-0.01, 0.07)]
         tissue.incise(slit, (0.0, 1.0, 0.0))
@@ -256,9 +256,12 @@ def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_ba
 
 def test_as_the_blade_leaves_no_node_has_mass_that_it_does_not_need_at_rest():
     tissue = body_of(LEAST)
+    was_engaged, interaction = False, tissue._model.interaction
     for sweep in strokes.sweeps(strokes.slanted(MESH)):
         tissue.step(sweep, strokes.DT)
-    tissue._model.incision_ended()
+        if was_engaged and not interaction.is_engaged:
+            break  # later on lips that swing may need some again
+        was_engaged = interaction.is_engaged
     body, elastic, n = tissue._body, tissue._model.elasticity.arrays, tissue.n_nodes
     assert elastic.scaling.largest > elastic.scaling.added
     got = body.added_masses[:n] > 0.0
