@@ -128,8 +128,12 @@ def let_go(load: float, rest: float, across: int = _ACROSS) -> Swing:
     mesh = bar_mesh(across)
     silicone = _SILICONE.with_damping(_DAMPING_RATIO, *_BAND)
     tissue = Tissue(
-        mesh, silicone, fixed=fixed_nodes(mesh, "left"), gravity=(0.0, 0.0, -GRAVITY)
-    )  # fmt: skip
+        mesh,
+        silicone,
+        fixed=fixed_nodes(mesh, "left"),
+        gravity=(0.0, 0.0, -GRAVITY),
+        solver=SolverSettings(element="averaged"),
+    )
     tip = tissue.material_points(_TIP)
     thread = (
         tissue.attach(_edge(mesh), stiffness=_THREAD, damping=_THREAD_DAMPING) if load else None
