@@ -17,6 +17,7 @@ from tissue.blade.edge_search import (
 )
 from tissue.blade.faces_search import blade_box, find_faces, release_faces
 from tissue.blade.forces import clear_blade_forces
+from tissue.blade.held_length import measure_held_lengths
 from tissue.blade.path_tracing import trace_path
 from tissue.blade.spine_search import release_spine, update_spine
 from tissue.blade.wrench import WrenchReport, write_means, write_report
@@ -138,10 +139,12 @@ def update_anchors(
         free_retracted(blade, body, context.visits, path, pose)
         anchor_beside(blade, body, context.visits, pose, context.slit_reach)
         if not any_free_in_box(blade.anchors, pose, low, high):
+            measure_held_lengths(blade, body, pose)
             return NOT_SEARCHED
     if not _list_tetrahedra(context, nodes, n):
         return GRID_IS_FULL
     anchor_entering(blade, body, context.grid, edge, when, context.slit_reach, low, high)
+    measure_held_lengths(blade, body, pose_at(edge, when))
     return SEARCHED
 
 

@@ -89,9 +89,14 @@ class Anchors(Arrays):
     cut: FloatArray
     """Area at rest that the anchor has cut in this step [m2], shape (n,)."""
     length: FloatArray
-    """Length of edge that the sample stands for [m], shape (n,)."""
+    """Length of edge that the sample stands for [m], shape (n,): up to halfway to the next ones, or
+    to the skin (`tissue.blade.held_length`)."""
     stiffness: FloatArray
     """Stiffness of the anchor's spring [N/m], shape (n,)."""
+    spacing: float
+    """Distance between samples next to each other [m]."""
+    modulus: float
+    """Stiffness of the springs per length of edge [Pa]."""
     sheets: BodySheets
     """The sheet that each sample holds, of its run of samples (`find_sheets`)."""
 
@@ -119,7 +124,8 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         edge_length: Length of the edge [m].
         stiffness: Stiffness of the anchors per length of edge [Pa].
     """
-    length = np.full(n, edge_length / (n - 1))
+    spacing = edge_length / (n - 1)
+    length = np.full(n, spacing)
     length[[0, -1]] *= 0.5
     return Anchors(
         state=np.zeros(n, dtype=np.int64),
@@ -142,6 +148,8 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         cut=np.zeros(n),
         length=length,
         stiffness=stiffness * length,
+        spacing=float(spacing),
+        modulus=float(stiffness),
         sheets=new_body_sheets(n),
     )
 
@@ -233,8 +241,7 @@ def surplus_stretch(
     if distance == 0.0 or dot(stretch, pose.forward) < 0.0:
         return scale(0.0, stretch)
     across = dot(in_plane, pose.forward) / distance
-    force = held_toughness(anchors, k, law) * anchors.length[k] * across
-    surplus = distance - force / anchors.stiffness[k]
+    surplus = distance - held_toughness(anchors, k, law) * across / anchors.modulus
     return scale(max(surplus, 0.0) / distance, in_plane)
 
 

@@ -100,7 +100,7 @@ def find_sheets(anchors: Anchors, body: Body, apart: float) -> None:
     """
     sheets = anchors.sheets
     n = len(anchors.state)
-    spacing = 2.0 * anchors.length[0]  # the first sample stands for half
+    spacing = anchors.spacing
     before = -1
     for k in range(n):
         sheets.first[k] = -1

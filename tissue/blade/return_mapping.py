@@ -294,6 +294,8 @@ def _slip_anchor(
         totals.work_of_cutting += spent
         totals.released += before - spent
         return
+    if anchors.coarse.share[k] > 0.0:  # as a part of the slip: the blade pays for that too
+        fade_coarse_hold(anchors.coarse, k)
     # Where the tissue is very distorted an anchor slips less than was planned.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
     left = stored_energy(anchors, k, sub(stretch, slipped), pose, law)
@@ -308,8 +310,6 @@ def _slip_anchor(
     anchors.cut[k] += share * area
     totals.work_of_cutting += cost
     totals.work_of_breaking += before - left - cost
-    if anchors.coarse.share[k] > 0.0:
-        fade_coarse_hold(anchors.coarse, k)
     displacement = sub(vec3(anchors.rest, k), rest)
     update_rest_share(anchors, k, displacement, slipped, pose, blade.reach)
     at = anchor_position(anchors, body, body.positions, k)
