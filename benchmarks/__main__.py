@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import App, CycloptsError, Parameter
 
 from benchmarks.costs import checked_steps, saved_state, surface_values, undo
+from benchmarks.cutting_law import cutting_law
 from benchmarks.frame import fixed_cost, frame
 from benchmarks.links import device_link, lag, round_trip
 from benchmarks.mesh_study import mesh_study
@@ -55,6 +56,7 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "lag": lag,
     "peers": peers,
     "mesh-study": mesh_study,
+    "cutting-law": cutting_law,
 }
 """The benchmarks by name. Arguments `runs` and `watch` come from the options that all have."""
 

@@ -1,0 +1,296 @@
+"""The law of cutting in every tissue by name: force over toughness times length, and three areas.
+
+Blocks of each tissue are cut headless, on meshes of other sizes than those of the tests: along
+their planes and between them, at angles to them, from the skin down to a tip or through, at several
+speeds and by a slanted and a sliding edge. In the middle of each cut, where it is steady, the
+benchmark compares the force with the law, and the area that the edge sweeps in the material with
+those that open and that are paid for.
+"""
+
+import itertools
+import logging
+import math
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from benchmarks.timing import TurnWatch
+from scalpel_sim.errors import UsageError
+from scalpel_sim.validate.speed.measurements import BenchmarkResult
+from scalpel_sim.validate.speed.tables import Rows, compact_table
+from scalpel_sim.validate.speed.watch import SILENT
+from tissue import (
+    MATERIALS,
+    BladeSegment,
+    BladeSweep,
+    BoolArray,
+    FloatArray,
+    Material,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+    fixed_nodes,
+    lattice_block,
+)
+from tissue.blade.edge_anchors import ANCHORED
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+SIZE = (0.045, 0.09, 0.016)
+"""Edges of the blocks across, along the cut and up [m]."""
+MESHES = (("block", 3.2e-3), ("lattice", 4.5e-3), ("block", 8e-3))
+"""How cells are divided into tetrahedra, and their size [m]."""
+STEADY = (0.55, 0.85)
+"""Part of the length of the block in which a cut counts as steady."""
+DT = 1e-3
+"""Time step [s]."""
+APPROACH = 6e-3
+"""Distance before the block at which the edge begins [m]."""
+OVERHANG = 6e-3
+"""Length of an edge that cuts through, above and below the block [m]."""
+FORCE_OFF, LEAST_FORCE, AREAS_OFF = 0.05, 0.9, 0.03
+"""Bounds on a mean force, on the least one, and on areas paid for per area swept."""
+
+
+class Cut(NamedTuple):
+    """A straight cut through a block."""
+
+    name: str
+    x: float
+    """Where it crosses the middle of the block [m]."""
+    depth: float
+    """How deep the tip is [m]; more than the block is high: through, with both sides held."""
+    speed: float = 0.1
+    """Speed of the edge [m/s]."""
+    angle: float = 0.0
+    """Between the cut and the planes of the mesh [degrees]."""
+    slope: float = 0.0
+    """Of the edge against the upright [degrees]; the tip is behind."""
+    slide: float = 0.0
+    """How fast the edge slides along itself, per its speed."""
+
+    @property
+    def is_through(self) -> bool:
+        """Whether the edge cuts through."""
+        return self.depth > SIZE[2]
+
+
+CUTS = (
+    Cut("plane", 0.018, 0.008),
+    Cut("between", 0.0187, 0.0087),
+    Cut("middle", 0.02025, 0.0083),
+    Cut("slow", 0.0187, 0.0087, speed=0.02),
+    Cut("fast", 0.0187, 0.0087, speed=0.2),
+    Cut("15 degrees", 0.0225, 0.0087, angle=15.0),
+    Cut("37 degrees", 0.0225, 0.0083, angle=37.0),
+    Cut("60 degrees", 0.0225, 0.0087, angle=60.0),
+    Cut("edge sloped by 30", 0.0187, 0.0087, slope=30.0),
+    Cut("through", 0.0187, 0.1),
+    Cut("through, 37 degrees", 0.0225, 0.1, angle=37.0),
+    Cut("sliding by 0.7", 0.0187, 0.1, speed=0.06, slide=0.7),
+    Cut("sliding by 1.5", 0.0187, 0.1, speed=0.06, slide=1.5),
+)
+"""The cuts of every block."""
+
+
+class Measured(NamedTuple):
+    """What a steady cut came to. Areas are shares of what the edge sweeps in space."""
+
+    force: float
+    """Mean force along the cut over that of the law."""
+    ripple: float
+    """Standard deviation of the force over its mean."""
+    lowest: float
+    """Least force over that of the law."""
+    swept: float
+    """Area that the edge swept in the material, at rest."""
+    opened: float
+    """Area of the faces that opened; elements open one by one."""
+    paid: float
+    """Area that the blade paid for."""
+    released: float
+    """Energy of the springs of the edge that was lost, over the work of the blade."""
+
+
+class _Frame(NamedTuple):
+    """One frame of a cut."""
+
+    force: float
+    paid: float
+    opened: float
+    swept: float
+    released: float
+    work: float
+
+
+def law_of(material: Material, cut: Cut) -> float:
+    """Return the force along a cut that the law asks for [N]."""
+    speed = cut.speed * math.cos(math.radians(cut.slope))
+    toughness = material.toughness
+    if material.toughness_exponent > 0.0:
+        rise = (speed / material.toughness_speed) ** material.toughness_exponent
+        toughness *= 1.0 + rise
+    return toughness * min(cut.depth, SIZE[2]) / (1.0 + cut.slide**2)
+
+
+def make_block(kind: str, cell: float) -> TetrahedralMesh:
+    """Return the block in cells of about that size [m]; `kind`: block or lattice."""
+    cells = [max(1, round(edge / cell)) for edge in SIZE]
+    return (lattice_block if kind == "lattice" else block)(cells, SIZE)
+
+
+def poses(cut: Cut) -> tuple[FloatArray, list[BladeSegment]]:
+    """Return where the edge is along the block in each frame, 0 to 1, and its poses."""
+    angle, slope = math.radians(cut.angle), math.radians(cut.slope)
+    ahead = np.array([math.sin(angle), math.cos(angle), 0.0])
+    along = -math.sin(slope) * ahead + np.array([0.0, 0.0, math.cos(slope)])
+    forward = math.cos(slope) * ahead + np.array([0.0, 0.0, math.sin(slope)])
+    # Oblique cuts are as long as the block is wide, where that is less.
+    length = min(SIZE[1] / math.cos(angle), SIZE[0] / max(math.sin(angle), 1e-9))
+    begin, end = -0.5 * length - APPROACH, (STEADY[1] - 0.5) * length
+    travel = np.arange(begin, end, cut.speed * DT)
+    slid = cut.slide * (travel - begin)
+    low = -OVERHANG if cut.is_through else SIZE[2] - cut.depth
+    high = (SIZE[2] + OVERHANG + (slid[-1] if cut.is_through else 0.0) - low) / math.cos(slope)
+    middle = np.array([cut.x, 0.5 * SIZE[1], low])
+    tips = [middle + s * ahead - d * along for s, d in zip(travel, slid, strict=True)]
+    return travel / length + 0.5, [BladeSegment(tip, tip + high * along, forward) for tip in tips]
+
+
+def measure_cut(material: Material, mesh: TetrahedralMesh, cut: Cut) -> Measured:
+    """Make a cut, and return what it came to where it was steady."""
+    fixed = fixed_nodes(mesh, "left,right" if cut.is_through else "bottom")
+    solver = SolverSettings(audit=True)
+    tissue = Tissue(mesh, material, fixed=fixed, gravity=(0.0, 0.0, 0.0), solver=solver)
+    where, edges = poses(cut)
+    ahead = edges[1].tip - edges[0].tip
+    ahead = np.array([ahead[0], ahead[1], 0.0]) / np.linalg.norm(ahead[:2])
+    frames: list[_Frame] = []
+    before = _anchors(tissue)
+    for pair in itertools.pairwise(edges):
+        result = tissue.step(BladeSweep(*pair), DT)
+        now = _anchors(tissue)
+        assert result.energies is not None
+        frames.append(
+            _Frame(
+                force=-float(result.wrench.force @ ahead),
+                paid=float(result.contacts.cut_area.sum()),
+                opened=result.cut_area,
+                swept=_swept(before, now, cut.is_through),
+                released=result.energies.released,
+                work=result.energies.work_of_blade,
+            )
+        )
+        before = now
+    record = np.array(frames)[(where[1:] > STEADY[0]) & (where[1:] < STEADY[1])]
+    first, last = record[0], record[-1]
+    force, areas = record[:, 0], record[1:, [1, 3]].sum(axis=0)
+    geometric = (len(record) - 1) * cut.speed * DT * min(cut.depth, SIZE[2])
+    law = law_of(material, cut)
+    return Measured(
+        force=float(force.mean() / law),
+        ripple=float(force.std() / abs(force.mean())),
+        lowest=float(force.min() / law),
+        swept=float(areas[1] / geometric),
+        opened=float((last[2] - first[2]) / geometric),
+        paid=float(areas[0] / geometric),
+        released=float((last[4] - first[4]) / (last[5] - first[5])),
+    )
+
+
+def _anchors(tissue: Tissue) -> tuple[FloatArray, BoolArray]:
+    """Return the material points that hold the edge [m], and which of them do."""
+    anchors = tissue._model.interaction.state.anchors
+    return anchors.rest.copy(), anchors.state == ANCHORED
+
+
+def _swept(
+    before: tuple[FloatArray, BoolArray], now: tuple[FloatArray, BoolArray], is_through: bool
+) -> float:
+    """Return the area between the material points then and now, and up to the skin [m2]."""
+    if len(before[0]) != len(now[0]):  # the edge was taken up in this frame
+        return 0.0
+    held = before[1] & now[1]
+    if not held.any():
+        return 0.0
+    p, q = before[0], now[0]
+    quads = 0.5 * np.linalg.norm(np.cross(q[1:] - p[:-1], q[:-1] - p[1:]), axis=1)
+    area = float(quads[held[1:] & held[:-1]].sum())
+    ends = np.flatnonzero(held)[[0, -1]]
+    moved = np.linalg.norm((q - p)[ends, :2], axis=1)
+    height = 0.5 * (p + q)[ends, 2]
+    area += float(moved[1] * max(SIZE[2] - height[1], 0.0))
+    return area + (float(moved[0] * max(height[0], 0.0)) if is_through else 0.0)
+
+
+def cutting_law(
+    *,
+    watch: TurnWatch = SILENT,
+    presets: str = "all",
+    cuts: Literal["all", "few"] = "all",
+) -> BenchmarkResult:
+    """Compare the force and the areas of steady cuts with the law, in every tissue by name.
+
+    Args:
+        watch: Receives the progress.
+        presets: Names of tissues, joined by commas, or `all`.
+        cuts: All cuts, or a few of each tissue: those between planes, at 37 degrees and through.
+
+    Raises:
+        UsageError: There is no such tissue.
+    """
+    names = list(MATERIALS) if presets == "all" else presets.split(",")
+    for name in names:
+        if name not in MATERIALS:
+            raise UsageError(f"there is no tissue {name!r}. Tissues: {', '.join(MATERIALS)}")
+    chosen = [CUTS[1], CUTS[6], CUTS[9]] if cuts == "few" else list(CUTS)
+    watch.begin(len(names) * len(MESHES))
+    found: list[tuple[str, str, Cut, Measured]] = []
+    quiet = logging.getLogger("tissue")
+    level = quiet.level
+    quiet.setLevel(logging.ERROR)  # some are tougher than their law bears: the table shows it
+    try:
+        for name, (kind, cell) in itertools.product(names, MESHES):
+            mesh, material = make_block(kind, cell), MATERIALS[name].material
+            label = f"{kind} {cell * 1e3:g} mm"
+            for cut in chosen:
+                found.append((name, label, cut, measure_cut(material, mesh, cut)))
+            watch.tick(f"{name}, {label}")
+    finally:
+        quiet.setLevel(level)
+    return _result(found)
+
+
+def _result(found: list[tuple[str, str, Cut, Measured]]) -> BenchmarkResult:
+    """Return the outcome: a row for each cut, the means, and the worst of all."""
+    rows = Rows("cutting-law")
+    by_tissue = {name: [m for n, _, _, m in found if n == name] for name, *_ in found}
+    for name, measured in by_tissue.items():
+        rows.values(name, None, [m.force for m in measured], "law", quantity="force")
+    columns = ("force", "ripple", "lowest", "swept", "opened", "paid", "released")
+
+    def show(console: "Console") -> None:
+        table = compact_table("steady cuts, over the law", ("tissue", "mesh", "cut"), columns)
+        for name, mesh, cut, each in found:
+            table.add_row(name, mesh, cut.name, *(f"{value:.3f}" for value in each))
+        console.print(table)
+        for name, measured in by_tissue.items():
+            force = np.array([m.force for m in measured])
+            paid = np.array([m.paid / m.swept for m in measured])
+            opened = np.array([m.opened / m.swept for m in measured])
+            console.print(
+                f"{name}: force {force.mean():.3f}, {force.min():.3f} to {force.max():.3f}; "
+                f"paid / swept {paid.min():.3f} to {paid.max():.3f}; "
+                f"opened / swept {opened.min():.3f} to {opened.max():.3f}",
+                highlight=False,
+            )
+
+    is_right = all(
+        abs(np.mean([m.force for m in measured]) - 1.0) <= FORCE_OFF
+        and min(m.force for m in measured) >= LEAST_FORCE
+        and max(abs(m.paid / m.swept - 1.0) for m in measured) <= AREAS_OFF
+        for measured in by_tissue.values()
+    )
+    return BenchmarkResult(rows.measured, rows.skipped, show, is_right)
