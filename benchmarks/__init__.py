@@ -2,6 +2,6 @@
 
 `__main__` lists them by name. Each is a function that returns a `BenchmarkResult`; `timing` is the
 timer, `scalpel_sim.validate.speed` holds the format of what is measured and the tables. `engine`
-alone calls the engine's inner loops. `peers` runs other engines; `mesh_study` judges, and times
+alone calls the engine's inner loops. `peers` runs other engines; `studies` judge, and time
 nothing.
 """

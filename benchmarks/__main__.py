@@ -7,15 +7,15 @@ from typing import Annotated
 from cyclopts import App, CycloptsError, Parameter
 
 from benchmarks.costs import checked_steps, saved_state, surface_values, undo
-from benchmarks.cutting_law import cutting_law
 from benchmarks.frame import fixed_cost, frame
 from benchmarks.links import device_link, lag, round_trip
-from benchmarks.mesh_study import mesh_study
 from benchmarks.peers.benchmark import peers
 from benchmarks.real_time import real_time
 from benchmarks.scaling import cut, kernels, scaling
 from benchmarks.scene_costs import measure_scene_costs
 from benchmarks.strokes import random_strokes
+from benchmarks.studies.cutting_law import cutting_law
+from benchmarks.studies.mesh_study import mesh_study
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, exit_code, one_line
 from scalpel_sim.runs.console import say_error

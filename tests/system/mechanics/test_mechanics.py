@@ -12,7 +12,7 @@ import pytest
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import cg
 
-from benchmarks.mesh_study import MODES, Bar, Model
+from benchmarks.studies.mesh_study import MODES, Bar, Model
 from tests.support import bodies
 from tests.support.materials import SPRINGS
 from tissue import SolverSettings, TetrahedralMesh, Tissue, block

@@ -44,17 +44,17 @@ MESHES = (("block", 3.2e-3), ("lattice", 4.5e-3), ("block", 8e-3))
 """How cells are divided into tetrahedra, and their size [m]."""
 STEADY = (0.55, 0.85)
 """Part of the length of the block in which a cut counts as steady."""
-DT = 1e-3
+LAW_DT = 1e-3
 """Time step [s]."""
 APPROACH = 6e-3
 """Distance before the block at which the edge begins [m]."""
-OVERHANG = 6e-3
+OUT_OF_BLOCK = 6e-3
 """Length of an edge that cuts through, above and below the block [m]."""
-FORCE_OFF, LEAST_FORCE, AREAS_OFF = 0.05, 0.9, 0.03
+FORCE_OFF, LEAST_OF_LAW, AREAS_OFF = 0.05, 0.9, 0.03
 """Bounds on a mean force, on the least one, and on areas paid for per area swept."""
 
 
-class Cut(NamedTuple):
+class LawCut(NamedTuple):
     """A straight cut through a block."""
 
     name: str
@@ -78,19 +78,19 @@ class Cut(NamedTuple):
 
 
 CUTS = (
-    Cut("plane", 0.018, 0.008),
-    Cut("between", 0.0187, 0.0087),
-    Cut("middle", 0.02025, 0.0083),
-    Cut("slow", 0.0187, 0.0087, speed=0.02),
-    Cut("fast", 0.0187, 0.0087, speed=0.2),
-    Cut("15 degrees", 0.0225, 0.0087, angle=15.0),
-    Cut("37 degrees", 0.0225, 0.0083, angle=37.0),
-    Cut("60 degrees", 0.0225, 0.0087, angle=60.0),
-    Cut("edge sloped by 30", 0.0187, 0.0087, slope=30.0),
-    Cut("through", 0.0187, 0.1),
-    Cut("through, 37 degrees", 0.0225, 0.1, angle=37.0),
-    Cut("sliding by 0.7", 0.0187, 0.1, speed=0.06, slide=0.7),
-    Cut("sliding by 1.5", 0.0187, 0.1, speed=0.06, slide=1.5),
+    LawCut("plane", 0.018, 0.008),
+    LawCut("between", 0.0187, 0.0087),
+    LawCut("middle", 0.02025, 0.0083),
+    LawCut("slow", 0.0187, 0.0087, speed=0.02),
+    LawCut("fast", 0.0187, 0.0087, speed=0.2),
+    LawCut("15 degrees", 0.0225, 0.0087, angle=15.0),
+    LawCut("37 degrees", 0.0225, 0.0083, angle=37.0),
+    LawCut("60 degrees", 0.0225, 0.0087, angle=60.0),
+    LawCut("edge sloped by 30", 0.0187, 0.0087, slope=30.0),
+    LawCut("through", 0.0187, 0.1),
+    LawCut("through, 37 degrees", 0.0225, 0.1, angle=37.0),
+    LawCut("sliding by 0.7", 0.0187, 0.1, speed=0.06, slide=0.7),
+    LawCut("sliding by 1.5", 0.0187, 0.1, speed=0.06, slide=1.5),
 )
 """The cuts of every block."""
 
@@ -125,7 +125,7 @@ class _Frame(NamedTuple):
     work: float
 
 
-def law_of(material: Material, cut: Cut) -> float:
+def law_of(material: Material, cut: LawCut) -> float:
     """Return the force along a cut that the law asks for [N]."""
     speed = cut.speed * math.cos(math.radians(cut.slope))
     toughness = material.toughness
@@ -141,7 +141,7 @@ def make_block(kind: str, cell: float) -> TetrahedralMesh:
     return (lattice_block if kind == "lattice" else block)(cells, SIZE)
 
 
-def poses(cut: Cut) -> tuple[FloatArray, list[BladeSegment]]:
+def poses(cut: LawCut) -> tuple[FloatArray, list[BladeSegment]]:
     """Return where the edge is along the block in each frame, 0 to 1, and its poses."""
     angle, slope = math.radians(cut.angle), math.radians(cut.slope)
     ahead = np.array([math.sin(angle), math.cos(angle), 0.0])
@@ -150,16 +150,16 @@ def poses(cut: Cut) -> tuple[FloatArray, list[BladeSegment]]:
     # Oblique cuts are as long as the block is wide, where that is less.
     length = min(SIZE[1] / math.cos(angle), SIZE[0] / max(math.sin(angle), 1e-9))
     begin, end = -0.5 * length - APPROACH, (STEADY[1] - 0.5) * length
-    travel = np.arange(begin, end, cut.speed * DT)
+    travel = np.arange(begin, end, cut.speed * LAW_DT)
     slid = cut.slide * (travel - begin)
-    low = -OVERHANG if cut.is_through else SIZE[2] - cut.depth
-    high = (SIZE[2] + OVERHANG + (slid[-1] if cut.is_through else 0.0) - low) / math.cos(slope)
+    low = -OUT_OF_BLOCK if cut.is_through else SIZE[2] - cut.depth
+    high = (SIZE[2] + OUT_OF_BLOCK + (slid[-1] if cut.is_through else 0.0) - low) / math.cos(slope)
     middle = np.array([cut.x, 0.5 * SIZE[1], low])
     tips = [middle + s * ahead - d * along for s, d in zip(travel, slid, strict=True)]
     return travel / length + 0.5, [BladeSegment(tip, tip + high * along, forward) for tip in tips]
 
 
-def measure_cut(material: Material, mesh: TetrahedralMesh, cut: Cut) -> Measured:
+def measure_cut(material: Material, mesh: TetrahedralMesh, cut: LawCut) -> Measured:
     """Make a cut, and return what it came to where it was steady."""
     fixed = fixed_nodes(mesh, "left,right" if cut.is_through else "bottom")
     solver = SolverSettings(audit=True)
@@ -170,7 +170,7 @@ def measure_cut(material: Material, mesh: TetrahedralMesh, cut: Cut) -> Measured
     frames: list[_Frame] = []
     before = _anchors(tissue)
     for pair in itertools.pairwise(edges):
-        result = tissue.step(BladeSweep(*pair), DT)
+        result = tissue.step(BladeSweep(*pair), LAW_DT)
         now = _anchors(tissue)
         assert result.energies is not None
         frames.append(
@@ -187,7 +187,7 @@ def measure_cut(material: Material, mesh: TetrahedralMesh, cut: Cut) -> Measured
     record = np.array(frames)[(where[1:] > STEADY[0]) & (where[1:] < STEADY[1])]
     first, last = record[0], record[-1]
     force, areas = record[:, 0], record[1:, [1, 3]].sum(axis=0)
-    geometric = (len(record) - 1) * cut.speed * DT * min(cut.depth, SIZE[2])
+    geometric = (len(record) - 1) * cut.speed * LAW_DT * min(cut.depth, SIZE[2])
     law = law_of(material, cut)
     return Measured(
         force=float(force.mean() / law),
@@ -247,7 +247,7 @@ def cutting_law(
             raise UsageError(f"there is no tissue {name!r}. Tissues: {', '.join(MATERIALS)}")
     chosen = [CUTS[1], CUTS[6], CUTS[9]] if cuts == "few" else list(CUTS)
     watch.begin(len(names) * len(MESHES))
-    found: list[tuple[str, str, Cut, Measured]] = []
+    found: list[tuple[str, str, LawCut, Measured]] = []
     quiet = logging.getLogger("tissue")
     level = quiet.level
     quiet.setLevel(logging.ERROR)  # some are tougher than their law bears: the table shows it
@@ -263,7 +263,7 @@ def cutting_law(
     return _result(found)
 
 
-def _result(found: list[tuple[str, str, Cut, Measured]]) -> BenchmarkResult:
+def _result(found: list[tuple[str, str, LawCut, Measured]]) -> BenchmarkResult:
     """Return the outcome: a row for each cut, the means, and the worst of all."""
     rows = Rows("cutting-law")
     by_tissue = {name: [m for n, _, _, m in found if n == name] for name, *_ in found}
@@ -289,7 +289,7 @@ def _result(found: list[tuple[str, str, Cut, Measured]]) -> BenchmarkResult:
 
     is_right = all(
         abs(np.mean([m.force for m in measured]) - 1.0) <= FORCE_OFF
-        and min(m.force for m in measured) >= LEAST_FORCE
+        and min(m.force for m in measured) >= LEAST_OF_LAW
         and max(abs(m.paid / m.swept - 1.0) for m in measured) <= AREAS_OFF
         for measured in by_tissue.values()
     )

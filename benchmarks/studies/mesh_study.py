@@ -26,7 +26,7 @@ from scalpel_sim.validate.torsion import TORSION_CONSTANT
 from tissue import FloatArray, Material, TetrahedralMesh, block, lattice_block
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 
-_PAGE = Path(__file__).parents[1] / "docs" / "mesh_study.md"
+_PAGE = Path(__file__).parents[2] / "docs" / "mesh_study.md"
 """Page whose table is replaced."""
 
 SLENDERNESS = 8
