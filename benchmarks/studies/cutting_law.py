@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 SIZE = (0.045, 0.09, 0.016)
 """Edges of the blocks across, along the cut and up [m]."""
-MESHES = (("block", 3.2e-3), ("lattice", 4.5e-3), ("block", 8e-3))
+MESHES = (("block", 8e-3), ("lattice", 8e-3), ("lattice", 4.5e-3))
 """How cells are divided into tetrahedra, and their size [m]."""
 STEADY = (0.55, 0.85)
 """Part of the length of the block in which a cut counts as steady."""
