@@ -98,7 +98,7 @@ def test_a_bar_swings_with_the_frequency_that_its_sag_implies(coarse_bar):
 @pytest.mark.parametrize("of", [bar.beam_theory, clamped_solid.clamped_solid])
 def test_a_bar_on_a_coarse_mesh_fails_and_one_that_does_as_theory_says_passes(coarse_bar, of):
     theory = of(0.0)
-    assert verdicts(beam.check_bar("it", coarse_bar, theory)) == [FAIL] * 3
+    assert verdicts(beam.check_bar("it", coarse_bar, theory)) == [FAIL, FAIL, PASS]
     names = clamped_solid.ClampedSolid._fields
     right = coarse_bar._replace(**{name: getattr(theory, name) for name in names})
     assert verdicts(beam.check_bar("it", right, theory)) == [PASS] * 3
