@@ -159,10 +159,12 @@ def poses(cut: LawCut) -> tuple[FloatArray, list[BladeSegment]]:
     return travel / length + 0.5, [BladeSegment(tip, tip + high * along, forward) for tip in tips]
 
 
-def measure_cut(material: Material, mesh: TetrahedralMesh, cut: LawCut) -> Measured:
+def measure_cut(
+    material: Material, mesh: TetrahedralMesh, cut: LawCut, element: str = "plain"
+) -> Measured:
     """Make a cut, and return what it came to where it was steady."""
     fixed = fixed_nodes(mesh, "left,right" if cut.is_through else "bottom")
-    solver = SolverSettings(audit=True)
+    solver = SolverSettings(audit=True, element=element)
     tissue = Tissue(mesh, material, fixed=fixed, gravity=(0.0, 0.0, 0.0), solver=solver)
     where, edges = poses(cut)
     ahead = edges[1].tip - edges[0].tip
@@ -230,6 +232,7 @@ def cutting_law(
     watch: TurnWatch = SILENT,
     presets: str = "all",
     cuts: Literal["all", "few"] = "all",
+    element: Literal["plain", "averaged"] = "plain",
 ) -> BenchmarkResult:
     """Compare the force and the areas of steady cuts with the law, in every tissue by name.
 
@@ -237,6 +240,7 @@ def cutting_law(
         watch: Receives the progress.
         presets: Names of tissues, joined by commas, or `all`.
         cuts: All cuts, or a few of each tissue: those between planes, at 37 degrees and through.
+        element: How tetrahedra are strained.
 
     Raises:
         UsageError: There is no such tissue.
@@ -256,7 +260,7 @@ def cutting_law(
             mesh, material = make_block(kind, cell), MATERIALS[name].material
             label = f"{kind} {cell * 1e3:g} mm"
             for cut in chosen:
-                found.append((name, label, cut, measure_cut(material, mesh, cut)))
+                found.append((name, label, cut, measure_cut(material, mesh, cut, element)))
             watch.tick(f"{name}, {label}")
     finally:
         quiet.setLevel(level)
