@@ -85,7 +85,7 @@ def test_the_summary_says_what_each_held_and_at_which_force(first):
     assert right["force_peak_n"] == pytest.approx(largest)
     assert tie["where"].startswith("sphere") and tie["force_at_end_n"] == 0.0
     energies = summary["energies_j"]
-    assert energies["breaking"] > 50.0 * 1e-6  # the ligament's, and of the skin
+    assert energies["breaking"] == pytest.approx(50.0 * 1e-6, rel=0.05)  # the ligament's
     assert energies["work_of_loads"] > 1e-5
     works = energies["work_of_blade"] + energies["work_of_loads"]
     assert abs(energies["residual"]) < 5e-3 * works

@@ -213,8 +213,8 @@ def test_tissue_that_is_too_tough_for_its_stiffness_releases_energy():
 
 def test_area_that_is_not_paid_for_is_told_with_its_place():
     outcome = run(OBEDIENT["clean through"])
-    nothing = dict.fromkeys(("cutting_j", "work_of_blade_j"), lambda each: 0.0)
-    free = with_columns(outcome.recording, **nothing)
+    names = ("cutting_j", "work_of_blade_j", "released_j")
+    free = with_columns(outcome.recording, **dict.fromkeys(names, lambda each: 0.0))
     warning = only_warning(replace(outcome, recording=free))
     assert warning.kind == "area_unpaid"
     assert warning.figures["unpaid_area_m2"] == pytest.approx(6e-4, rel=0.1)
