@@ -24,7 +24,7 @@ COPIED = ("bridge", "scalpel_sim", "tests", "tissue", "pyproject.toml", "README.
 N_COPIES = 2
 """Errors that are tried at a time, each in a copy of its own."""
 LONGEST_PASS = 600.0
-"""Seconds after which tests of sources without an error have failed; some 20 s are usual."""
+"""Seconds after which tests of sources without an error have failed; some 15 s are usual."""
 FAILED = 1
 """Exit code of pytest where tests were run, and some failed; others are errors of this list."""
 

@@ -38,6 +38,15 @@ def set_velocities(tissue, velocity):
     body.velocities[:n] = velocity(body.positions[:n] - body.positions[:n].mean(axis=0))
 
 
+@pytest.mark.kernel
+def test_a_body_falls_along_gravity_whatever_its_direction():
+    gravity = np.array([1.0, 2.0, -3.0])
+    tissue = Tissue(block((1, 1, 1), (0.03,) * 3), gravity=gravity)
+    tissue.step(None, 1e-4)
+    expected = np.tile(1e-4 * gravity, (tissue.n_nodes, 1))
+    np.testing.assert_allclose(tissue.snapshot().velocities, expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("relaxation", ["global", "verlet"])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_loose_piece_falls_at_g(law, relaxation):

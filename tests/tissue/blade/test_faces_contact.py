@@ -133,6 +133,13 @@ def test_friction_holds_below_its_limit_and_slides_above(pressed):
     assert pressed.press(far)[1] == pytest.approx(0.5 * normal, rel=1e-9)
 
 
+def test_friction_drags_tissue_along_the_edge_as_the_blade_moves_along_it(pressed):
+    pressed.press(edge_at(0.0108))
+    pressed.slide(edge_at(0.0108))
+    held = pressed.press(edge_at(0.0108, z=-0.01 + 0.0499e-3))[2]
+    assert held == pytest.approx(pressed.sides.stiffness * 0.0499e-3 * 0.01**2, rel=1e-6)
+
+
 def test_sliding_dissipates_friction_times_displacement(pressed):
     pressed.slide(edge_at(0.0108))
     normal = -pressed.press(edge_at(0.0108))[0]

@@ -18,6 +18,7 @@ from tissue.cutting.stellar_subdivision import (
     split_edge,
     split_face,
 )
+from tissue.mesh.angular_momentum import return_spin
 
 pytestmark = pytest.mark.kernel
 
@@ -81,6 +82,25 @@ def test_splits_leave_a_sound_mesh_of_the_same_mass_and_momentum(mesh, splits):
     springs_of(cut.body)
     assert cut.body.masses.sum() == pytest.approx(DENSITY, rel=1e-13)
     assert cut.body.masses @ cut.body.velocities == pytest.approx(before, abs=1e-12 * DENSITY)
+
+
+def test_what_a_split_loses_of_angular_momentum_is_returned():
+    cut = cut_of(MESHES[0])
+    springs_of(cut.body)
+    perturb(cut)
+
+    def spin():
+        body = cut.body
+        moments = np.cross(body.positions[:, :3], body.velocities[:, :3])
+        return body.masses @ moments
+
+    before, nodes = spin(), cut.body.tetrahedra[0]
+    split_edge(cut, nodes[0], nodes[1], 0.4)
+    springs_of(cut.body)
+    assert not np.allclose(spin(), before, atol=1e-3 * DENSITY)
+    every = np.arange(cut.body.n_nodes)
+    return_spin(cut.body, cut.change, DENSITY, every, len(every))
+    np.testing.assert_allclose(spin(), before, atol=1e-12 * DENSITY)
 
 
 def test_an_edge_split_doubles_the_tetrahedra_around_the_edge():
