@@ -179,13 +179,9 @@ def corner_forces(solid: Solid, begin: int, end: int) -> None:
     Gradients, and what is averaged around nodes, are up to date.
     """
     # Loops of their own, so that the code of each is without a branch.
-    if averages_shear(solid):
-        if relaxes(solid):
-            for block in range(begin, end):
-                _corner_forces_of(solid, natural(block), True, True)
-        else:
-            for block in range(begin, end):
-                _corner_forces_of(solid, natural(block), False, True)
+    if averages_shear(solid):  # where stress relaxes, none is averaged
+        for block in range(begin, end):
+            _corner_forces_of(solid, natural(block), False, True)
     elif relaxes(solid):
         for block in range(begin, end):
             _corner_forces_of(solid, natural(block), True, False)

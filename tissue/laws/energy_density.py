@@ -11,12 +11,11 @@ theory, not 0.73."""
 
 
 SHARE_OF_NODES = 0.7
-"""Share of the shear that is averaged around nodes by default. The shear of each tetrahedron by
-itself is too stiff where strain varies within it, in twisting and bending, and that of averages too
-soft, by an error that is as large as the square of the size of the elements. At 0.7 the two cancel:
-to first order the share is that of the errors, 0.18 against 0.08 in the torsion of a bar of six
-cells of a block, 0.12 against 0.06 of five of a lattice. With 1 there are motions that averages
-hardly see."""
+"""Share of the shear that is averaged around nodes. The shear of each tetrahedron by itself is too
+stiff where strain varies within it, in twisting and bending, and that of averages too soft; both
+errors fall with the square of the size of the elements. At 0.7 they cancel: the share is that of
+the errors, 0.18 against 0.08 in the torsion of a bar of six cells of a block, 0.12 against 0.06 of
+five of a lattice. With 1 there are motions that averages hardly see."""
 
 
 class EnergyDensity(Arrays):
