@@ -34,13 +34,13 @@ class Mutant:
     """A planted error."""
 
     name: str
-    """What is wrong."""
+    """Name of the error."""
     file: str
     """Its file, from the root of the repository."""
     old: str
     """Text that is in the file exactly once."""
     new: str
-    """What replaces it."""
+    """Text in its place."""
     tests: tuple[str, ...]
     """The tests that must catch it, as pytest has them."""
     hangs_after: float = 0.0
@@ -48,7 +48,7 @@ class Mutant:
 
 
 class Outcome(NamedTuple):
-    """What came of tests with an error."""
+    """Outcome of tests with an error planted."""
 
     is_caught: bool
     """Whether a test failed."""

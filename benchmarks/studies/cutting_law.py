@@ -96,7 +96,7 @@ CUTS = (
 
 
 class Measured(NamedTuple):
-    """What a steady cut came to. Areas are shares of what the edge sweeps in space."""
+    """Outcome of a steady cut. Areas are shares of what the edge sweeps in space."""
 
     force: float
     """Mean force along the cut over that of the law."""

@@ -31,7 +31,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A measurement of one or more curves."""
 
     spread: str
-    """What the spread of the curves is of."""
+    """Kind of the spread: of specimens, of directions, or assumed."""
     source: str
     """Where the points come from."""
     why: str
@@ -46,7 +46,7 @@ class MeasuredCurve(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     material: str
     """Name of the material."""
     title: str
-    """What was measured, how fast."""
+    """Measured quantity and its rate."""
     quantity: Literal["stress", "shear modulus"]
     """Cauchy's stress along the first axis, or the modulus of a small shear."""
     along: list[float]

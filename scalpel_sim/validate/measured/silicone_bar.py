@@ -45,7 +45,7 @@ _N_CROSSINGS = 3
 
 
 class Take(NamedTuple):
-    """What was measured under one load."""
+    """Measurements under one load."""
 
     name: str
     """Name of its lines."""
@@ -118,7 +118,7 @@ def height_at_rest(load: float, across: int = _ACROSS) -> float:
 
 
 def let_go(load: float, rest: float, across: int = _ACROSS) -> Swing:
-    """Let the bar go from the horizontal, until it has crossed its rest position three times.
+    """Release the bar from the horizontal, until it has crossed its rest position three times.
 
     Args:
         load: Weight at the tip's upper edge [N].
@@ -182,7 +182,7 @@ def check_solid(rest: float) -> Check:
 
 
 def measure_silicone_bar(quick: bool) -> Findings:
-    """Let the bar sag and swing under each load; the short version takes no weight."""
+    """Measure how the bar sags and swings under each load; the short version takes no weight."""
     checks: list[Check] = []
     curves: list[Curve] = []
     for take in TAKES[:1] if quick else TAKES:

@@ -74,7 +74,7 @@ def free_block(law, relaxation="global", gravity=GRAVITY):
 
 
 class Balance:
-    """What is left of the balance of momentum in each step of a cut, and what it consists of."""
+    """Remainder of the balance of momentum in each step of a cut, and its parts."""
 
     def __init__(self, tissue, holds, touch=None, gravity=GRAVITY):
         self.own, self.whole, self.impulse = [], [], []

@@ -68,8 +68,10 @@ def bound(solid, positions, allowed=np.inf):
     [law_of(nu, averaged) for nu in (0.3, 0.49) for averaged in (False, True)]
     + [LAWS["exponential"], LAWS["yeoh"]]
     + [LAWS[f"averaged {name}"] for name in ("shear", "exponential", "yeoh")],
-    ids=["plain", "averaged", "plain 0.49", "averaged 0.49", "exponential", "yeoh"]
-    + ["averaged shear", "averaged exponential", "averaged yeoh"],
+    ids=[
+        *("plain", "averaged", "plain 0.49", "averaged 0.49", "exponential", "yeoh"),
+        *("averaged shear", "averaged exponential", "averaged yeoh"),
+    ],
 )
 @pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
 def test_the_bounds_hold_however_the_body_is_stretched(stretch, law):
