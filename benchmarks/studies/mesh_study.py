@@ -85,8 +85,6 @@ class Model(NamedTuple):
     material: Material
     averaged: bool = True
     """Whether dilatation is averaged over nodes, as in the engine."""
-    element: str = "plain"
-    """How tetrahedra are strained (`SolverSettings.element`)."""
     shape: Callable[..., TetrahedralMesh] = block
     """How cells are divided into tetrahedra."""
 
@@ -98,17 +96,10 @@ def models() -> list[Model]:
     for nu in RATIOS:
         material = Material(10e3, 1000.0, law="neo_hookean", poisson_ratio=nu)
         if nu > 0.0:
-            locked = Model(f"neo-Hookean, nu {nu}, volume not averaged", material, averaged=False)
-            found.append(locked)
+            found.append(Model(f"neo-Hookean, nu {nu}, plain", material, averaged=False))
         found.append(Model(f"neo-Hookean, nu {nu}", material))
-        found.append(Model(f"neo-Hookean, nu {nu}, averaged", material, element="averaged"))
         if nu in ON_LATTICE:
-            found += [
-                Model(
-                    f"neo-Hookean, nu {nu}, lattice{name}", material, True, element, lattice_block
-                )
-                for name, element in (("", "plain"), (", averaged", "averaged"))
-            ]
+            found.append(Model(f"neo-Hookean, nu {nu}, lattice", material, shape=lattice_block))
     return found
 
 
@@ -135,9 +126,7 @@ class Bar:
         self.is_end = x > self.length * (1.0 - 1e-9)
         self.is_free = np.repeat(x > 1e-9 * self.length, 3)
         self.masses = masses(self.mesh, self.material.density)
-        matrix = stiffness_matrix(
-            self.mesh, self.material, averaged=model.averaged, element=model.element
-        )
+        matrix = stiffness_matrix(self.mesh, self.material, averaged=model.averaged)
         self.stiffness = matrix[self.is_free][:, self.is_free].tocsc()
 
     @cached_property
