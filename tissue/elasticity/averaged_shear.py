@@ -10,9 +10,9 @@ Liu, Nguyen-Thoi and Lam 2008, Comput. Methods Appl. Mech. Eng. 197:3883),
 
 with the shear part W of the law, and s = `EnergyDensity.shear_of_nodes`. J of the volume term is
 averaged around nodes in any case. At small strain W is convex, so that the mixture is nowhere
-stiffer than tetrahedra by themselves: bounds on their frequencies hold for it. Forces are the exact
-gradient: with P the stress of a node, from its F, a tetrahedron gets the mean of those of its four
-nodes besides its own, as it gave a quarter of V F to each.
+stiffer than tetrahedra by themselves; `tissue.elasticity.frequency.at_rest` bounds its frequencies.
+Forces are the exact gradient: with P the stress of a node, from its F, a tetrahedron gets the mean
+of those of its four nodes besides its own, as it gave a quarter of V F to each.
 
 With its share a tetrahedron resists less as it is pressed flat. Where its own J falls below
 `J_LIMIT`
@@ -75,7 +75,7 @@ def store_gradients(
         solid: Written.
         block: The block.
         v: Volumes [m3].
-        gradient: MatrixRows of H.
+        gradient: Rows of H.
         dilated: V (J - 1) [m3].
     """
     x, y, z = scale(v, gradient[0]), scale(v, gradient[1]), scale(v, gradient[2])

@@ -124,7 +124,7 @@ class Elasticity:
 
     def _count_momentum(self, body: Body, factor: float) -> None:
         scaling = self.arrays.scaling
-        if scaling.allowed < math.inf:
+        if scaling.added != 0.0:  # in most cuts no node has any
             every = self.arrays.solid.every
             _ADD_MOMENTUM.call(body, every, body.n_nodes, factor, scaling.impulse)
 

@@ -281,7 +281,7 @@ def _dilated(v: Lanes, x: Vec3, y: Vec3, z: Vec3, cofactors: MatrixRows) -> Lane
         x: First row of H.
         y: Second row.
         z: Third row.
-        cofactors: MatrixRows of cof H.
+        cofactors: Rows of cof H.
     """
     cx, cy, cz = cofactors
     growth = (x.x + y.y + z.z) + (cx.x + cy.y + cz.z) + dot(x, cx)

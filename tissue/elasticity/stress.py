@@ -8,7 +8,7 @@ from tissue.laws.energy_density import EnergyDensity
 from tissue.laws.kernels import stiffening_slope
 
 MatrixRows = tuple[Vec3, Vec3, Vec3]
-"""MatrixRows of a matrix of each lane of a vector."""
+"""Rows of a matrix of each lane of a vector."""
 
 
 @inlined
@@ -27,8 +27,8 @@ def stress_of(
         a: Factor of H.
         b: Factor of K.
         c: Factor of 1.
-        gradient: MatrixRows of H.
-        cofactors: MatrixRows of cof H.
+        gradient: Rows of H.
+        cofactors: Rows of cof H.
     """
     x, y, z = gradient
     cx, cy, cz = cofactors
@@ -65,8 +65,8 @@ def shear_stiffness(
         law: A law that stiffens.
         q: Its argument (`tissue.laws.kernels`).
         g: w'(q).
-        gradient: MatrixRows of H.
-        cofactors: MatrixRows of cof H.
+        gradient: Rows of H.
+        cofactors: Rows of cof H.
     """
     x, y, z = gradient
     cx, cy, cz = cofactors

@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support import bodies
+from tests.support import bodies, strokes
 from tests.support.hexahedra import Hexahedra, solved
 from tests.tissue.solids import LAWS, solid_of
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block, lattice_block
+from tissue.core.jit import is_compiling
 from tissue.elasticity.stiffness_matrix import stiffness_matrix
 
 SOFT = Material(young_modulus=1e5, poisson_ratio=0.45, law="neo_hookean")
@@ -171,3 +172,28 @@ def test_what_is_pressed_flat_resists_by_itself(j):
 def test_a_material_that_cannot_have_averaged_shear_is_refused(material):
     with pytest.raises(ValueError, match="element is 'averaged', which this material cannot have"):
         Tissue(block((1, 1, 1), (0.01,) * 3), material, solver=SolverSettings(element="averaged"))
+
+
+@pytest.mark.skipif(not is_compiling(), reason="a cut of a block: compiled only")
+@pytest.mark.parametrize("law", ["neo_hookean", "exponential"])
+def test_a_cut_gives_the_same_bits_with_two_threads_and_after_an_undo(law):
+    def cut(threads, undoes):
+        mesh = block((4, 4, 3), (0.04, 0.04, 0.03))
+        stiffening = {"stiffening": 5.0} if law == "exponential" else {}
+        material = Material(law=law, young_modulus=10e3, toughness=10.0, **stiffening)
+        solver = SolverSettings(element="averaged", threads=threads, precision="single")
+        tissue = Tissue(mesh, material, fixed=bodies.sides(mesh), solver=solver)
+        for i, sweep in enumerate(strokes.sweeps(strokes.slanted(mesh))):
+            if undoes and i == 60:
+                state = tissue.save_state()
+                for _ in range(20):
+                    tissue.step(None, strokes.DT)
+                tissue.load_state(state)
+            tissue.step(sweep, strokes.DT)
+        after = tissue.snapshot()
+        assert tissue.cut_report().now.n_tetrahedra > len(mesh.tetrahedra)
+        return after.positions.tobytes() + after.velocities.tobytes()
+
+    once = cut(1, False)
+    assert cut(2, False) == once
+    assert cut(1, True) == once

@@ -1,7 +1,7 @@
 """A bound on the angular frequencies of a solid at rest, at each node: it limits the time step.
 
-Each energy is a square |sum of L_a u_a|^2 over the nodes a of a tetrahedron, or, where volumes are
-averaged, over those of all tetrahedra around a node. For any positive numbers r_a
+Each energy is a square |sum of L_a u_a|^2 over the nodes a of a tetrahedron, or, where volumes or
+shear are averaged, over those of all tetrahedra around a node. For any positive numbers r_a
 
     |sum L_a u_a|^2 <= (sum r_a) (sum |L_a u_a|^2 / r_a)                     (Cauchy and Schwarz)
 
