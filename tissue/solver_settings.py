@@ -11,7 +11,7 @@ four of Verlet are stable in a millisecond. In an organ of 5,000 elements cut in
 of its mass. At 5,000 it is 1 %, and shows in the force (1.2 % of its peak); at 6,000 a step more is
 taken."""
 
-ELEMENTS = ("plain", "averaged")
+ELEMENTS = ("averaged", "plain")
 """How tetrahedra are strained by the motion of their nodes."""
 
 PRECISIONS = ("double", "single")
@@ -41,11 +41,11 @@ class SolverSettings:
     None: no mass is added. The added mass has no weight, and
     `CutReport.now.added_mass` says how much it is. For the laws of tetrahedra; where the elements
     of the uncut body are faster, their frequency is the limit."""
-    element: str = "plain"
-    """How tetrahedra are strained under the laws of solids: `plain`, each by itself; or
-    `averaged`, a share of the shear by gradients averaged around nodes
-    (`tissue.elasticity.averaged_shear`), so that coarse meshes bend and twist. Volume is averaged
-    around nodes either way. Tissue whose stress relaxes takes `plain`."""
+    element: str = "averaged"
+    """How tetrahedra are strained under the laws of solids: `averaged`, a share of the shear by
+    gradients averaged around nodes (`tissue.elasticity.averaged_shear`), so that coarse meshes
+    bend and twist as a solid; or `plain`, each by itself. Volume is averaged around nodes either
+    way. Under the law `springs` these carry the shear, and both are the same."""
     precision: str = "double"
     """Precision in which the forces of tetrahedra are computed: `double`, or `single`, which takes
     two thirds of the time. Positions and velocities are double either way."""

@@ -85,6 +85,8 @@ class Model(NamedTuple):
     material: Material
     averaged: bool = True
     """Whether dilatation is averaged over nodes, as in the engine."""
+    element: str = "plain"
+    """How tetrahedra are strained (`SolverSettings.element`)."""
     shape: Callable[..., TetrahedralMesh] = block
     """How cells are divided into tetrahedra."""
 
@@ -126,7 +128,9 @@ class Bar:
         self.is_end = x > self.length * (1.0 - 1e-9)
         self.is_free = np.repeat(x > 1e-9 * self.length, 3)
         self.masses = masses(self.mesh, self.material.density)
-        matrix = stiffness_matrix(self.mesh, self.material, averaged=model.averaged)
+        matrix = stiffness_matrix(
+            self.mesh, self.material, averaged=model.averaged, element=model.element
+        )
         self.stiffness = matrix[self.is_free][:, self.is_free].tocsc()
 
     @cached_property

@@ -89,7 +89,7 @@ def bar_tissue(
         weighs: Whether there is gravity.
     """
     gravity = (0.0, 0.0, -GRAVITY if weighs else 0.0)
-    solver = SolverSettings(relaxation="verlet", element="averaged")
+    solver = SolverSettings(relaxation="verlet")
     return Tissue(
         mesh, material, fixed=fixed, positions=positions, gravity=gravity, solver=solver
     )  # fmt: skip

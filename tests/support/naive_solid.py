@@ -88,9 +88,17 @@ def volume_energy(law: EnergyDensity, lam: float, j: FloatArray) -> FloatArray:
     return 0.5 * lam * ((j - law.a) ** 2 - (1.0 - law.a) ** 2) + linear
 
 
-def flat(law: EnergyDensity, j: FloatArray) -> FloatArray:
-    """Return how far J of each tetrahedron is below 0.3, where the shear is averaged."""
-    return np.maximum(0.3 - j, 0.0) * float(law.shear_of_nodes > 0.0)
+def shear_measure(f: FloatArray) -> FloatArray:
+    """Return q = |F|^2 - 1 - 2 J."""
+    return (f**2).sum(axis=(1, 2)) - 1.0 - 2.0 * np.linalg.det(f)
+
+
+def spread(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
+    """Return the spread of q around each node over that at which averages are given up, 0.03."""
+    v, q = volumes(mesh), shear_measure(gradients(mesh, positions))
+    averaged = around_nodes(mesh, v * q) / around_nodes(mesh, v)
+    own = shear_measure(averaged_gradients(mesh, positions))
+    return np.maximum(0.5 * (averaged - own), 0.0) / 0.03
 
 
 def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> float:
@@ -98,24 +106,48 @@ def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> 
     v, f, share = volumes(mesh), gradients(mesh, positions), law.shear_of_nodes
     j, of_nodes = np.linalg.det(f), averaged_j(mesh, positions)
     own = (1.0 - share) * shear_energy(law, f) + volume_energy(law, law.lam_of_tetrahedra, j)
-    own = own + 1.5 * law.shear_modulus * flat(law, j) ** 2
     mean = volume_energy(law, law.lam_of_nodes, of_nodes)
     if share:
+        x = spread(mesh, positions)
+        taken = 0.03 * (x - 2.0 * np.log1p(x) - 1.0 / (1.0 + x) + 1.0)
         mean = mean + share * shear_energy(law, averaged_gradients(mesh, positions))
+        mean = mean + share * law.shear_modulus * taken
     return float(v @ own + around_nodes(mesh, v) @ mean)
+
+
+def taken_back(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
+    """Return the shear modulus that tetrahedra take back around each node [Pa], (n_nodes, 1, 1)."""
+    x = spread(mesh, positions)
+    return (law.shear_of_nodes * law.shear_modulus * (x / (1.0 + x)) ** 2)[:, None, None]
+
+
+def shear_stress_of_tetrahedra(
+    mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity
+) -> FloatArray:
+    """Return the stress of the shear of each tetrahedron by itself [Pa], shape (n_tets, 3, 3)."""
+    f = gradients(mesh, positions)
+    taken = taken_back(mesh, positions, law)[mesh.tetrahedra].mean(axis=1)
+    return (1.0 - law.shear_of_nodes) * shear_stress(law, f) + taken * (f - cofactors(f))
+
+
+def shear_stress_of_nodes(
+    mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity
+) -> FloatArray:
+    """Return the stress of the averaged shear of each node [Pa], shape (n_nodes, 3, 3)."""
+    f = averaged_gradients(mesh, positions)
+    taken = taken_back(mesh, positions, law)
+    return law.shear_of_nodes * shear_stress(law, f) - taken * (f - cofactors(f))
 
 
 def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
     """Return the first Piola-Kirchhoff stress of each tetrahedron [Pa], shape (n_tets, 3, 3)."""
-    f, share = gradients(mesh, positions), law.shear_of_nodes
-    j = np.linalg.det(f)
-    p = law.lam_of_tetrahedra * (j - 1.0) - 3.0 * law.shear_modulus * flat(law, j)
+    f = gradients(mesh, positions)
     of_nodes = law.lam_of_nodes * (averaged_j(mesh, positions) - 1.0)
-    p = p + of_nodes[mesh.tetrahedra].mean(axis=1)
-    total = (1.0 - share) * shear_stress(law, f) + p[:, None, None] * cofactors(f)
-    if share:
-        mean = shear_stress(law, averaged_gradients(mesh, positions))
-        total = total + share * mean[mesh.tetrahedra].mean(axis=1)
+    p = law.lam_of_tetrahedra * (np.linalg.det(f) - 1.0) + of_nodes[mesh.tetrahedra].mean(axis=1)
+    total = shear_stress_of_tetrahedra(mesh, positions, law) + p[:, None, None] * cofactors(f)
+    if law.shear_of_nodes:
+        mean = shear_stress_of_nodes(mesh, positions, law)[mesh.tetrahedra].mean(axis=1)
+        total = total + mean
     return total
 
 

@@ -13,6 +13,7 @@ from tissue.core.simd import store_point
 from tissue.elasticity.energy import solid_energy
 from tissue.elasticity.finite_elements import (
     Solid,
+    averages_shear,
     build_stars,
     build_tetrahedra,
     n_blocks,
@@ -21,7 +22,7 @@ from tissue.elasticity.finite_elements import (
 )
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import deform_solid, solid_force, solid_forces
-from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks
+from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks, relax_nodes
 from tissue.laws.energy_density import (
     EnergyDensity,
     averaged_shear,
@@ -171,3 +172,5 @@ def relax_where_it_is(solid: Solid, body: Body, seconds: float) -> None:
     deform_solid(solid, body, body.positions)
     prepare_relaxation(solid, seconds)
     relax_blocks(solid, 0, n_blocks(solid, body.n_tetrahedra))
+    if averages_shear(solid):
+        relax_nodes(solid, 0, body.n_nodes)

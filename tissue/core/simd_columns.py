@@ -1,7 +1,7 @@
-"""Rows of ten numbers in kernels: summed as rows, and turned into columns for `Lanes`.
+"""Rows of eleven numbers in kernels: summed as rows, and turned into columns for `Lanes`.
 
 A row has room for sixteen, so that it begins with a cache line: in single precision it is one
-vector, in double eight and two. To sum five to thirty rows and turn the sums takes a third of the
+vector, in double two. To sum five to thirty rows and turn the sums takes a third of the
 operations of gathers of their numbers.
 
 As in `tissue.core.simd` each function is also a plain Python function, which runs when the JIT is
@@ -19,13 +19,13 @@ from tissue.core.simd import I64, WIDTH, Lanes, Operand, in_all_lanes, intrinsic
 from tissue.core.simd_blocks import BOTH, converted, kind_of, size_of, width_of
 from tissue.core.simd_rows import fold_in_pairs
 
-N_COLUMNS = 10
+N_COLUMNS = 11
 """Numbers of a row."""
 
 N_ROOM = 16
 """Numbers for which a row has room."""
 
-Columns = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
+Columns = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
 """The columns of as many rows as a vector has lanes."""
 
 _PAIR_LOW = [0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29]
@@ -154,7 +154,7 @@ def _width(rows: Operand) -> int:
 
 def _parts(rows: Operand) -> list[Any]:
     """Return LLVM's types of the vectors that a row is read as."""
-    counts = [16] if isinstance(rows.element, ir.FloatType) else [8, 2]
+    counts = [16] if isinstance(rows.element, ir.FloatType) else [8, 8]
     return [ir.VectorType(rows.element, count) for count in counts]
 
 
@@ -192,10 +192,8 @@ def _turned(builder: Any, rows: list[list[Any]]) -> list[Any]:
 
     if len(rows) == 16:
         return _turned_sixteen(mixed, [row[0] for row in rows])[:N_COLUMNS]
-    columns = _turned_eight(mixed, [row[0] for row in rows])
-    last = [mixed(rows[k][1], rows[k + 1][1], range(4)) for k in range(0, 8, 2)]
-    halves = [mixed(last[k], last[k + 1], range(8)) for k in (0, 2)]
-    return [*columns, *(mixed(halves[0], halves[1], range(q, 16, 2)) for q in range(2))]
+    parts = [_turned_eight(mixed, [row[part] for row in rows]) for part in range(2)]
+    return [*parts[0], *parts[1]][:N_COLUMNS]
 
 
 def _turned_back(builder: Any, columns: list[Any]) -> list[list[Any]]:
@@ -204,12 +202,12 @@ def _turned_back(builder: Any, columns: list[Any]) -> list[list[Any]]:
     def mixed(a: Any, b: Any, order: Any) -> Any:
         return shuffled(builder, a, b, order)
 
-    if columns[0].type.count == 16:
-        zero = ir.Constant(columns[0].type, None)
-        rows = _turned_sixteen(mixed, columns + [zero] * (16 - len(columns)))
-        return [[row] for row in rows]
-    rows = _turned_eight(mixed, columns[:8])
-    return [[row, mixed(columns[8], columns[9], [k, 8 + k])] for k, row in enumerate(rows)]
+    zero = ir.Constant(columns[0].type, None)
+    whole = columns + [zero] * (N_ROOM - len(columns))
+    if zero.type.count == N_ROOM:
+        return [[row] for row in _turned_sixteen(mixed, whole)]
+    parts = [_turned_eight(mixed, whole[first : first + 8]) for first in (0, 8)]
+    return [list(row) for row in zip(*parts, strict=True)]
 
 
 def _turned_sixteen(mixed: Any, rows: list[Any]) -> list[Any]:

@@ -22,7 +22,6 @@ from tissue.core.jit import kernel
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
-from tissue.elasticity.averaged_shear import J_LIMIT
 from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
 
@@ -37,6 +36,10 @@ each between nodes that go opposite ways. What cannot be flat so soon is not loo
 
 INCREMENTS_AHEAD: Final = 2.0
 """For how long J is taken to change as fast as it does [increments]: it may become faster."""
+
+J_LIMIT: Final = 0.3
+"""J below which a tetrahedron resists by itself. Larger: tissue that is merely pressed is no more
+that of the springs; smaller: the term must be stiffer to turn what moves at the same speed."""
 
 LARGEST_ADDED_SHARE: Final = 2.0
 """What one tetrahedron may add to w^2 of its nodes, as a share of the bound of the body at rest.

@@ -8,6 +8,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import SameTypes
 from tissue.elasticity.collapse import no_collapse, renew_collapsing
 from tissue.elasticity.finite_elements import (
+    averages_shear,
     build_stars,
     build_tetrahedra,
     grown_solid,
@@ -22,7 +23,7 @@ from tissue.elasticity.frequency.changes import (
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, add_momentum, no_mass_scaling
-from tissue.elasticity.relaxed_stress import inherit_relaxed
+from tissue.elasticity.relaxed_stress import inherit_at_nodes, inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
 from tissue.laws.energy_density import averaged_shear, volume_term
 from tissue.material import Material
@@ -180,6 +181,8 @@ class Elasticity:
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
+            if self._relaxes and averages_shear(self.arrays.solid):
+                inherit_at_nodes(self.arrays.solid, nodes, n)
         self._update_frequencies.call(self.arrays, body, visits, nodes, n)
         collapsing, highest = self.arrays.collapsing, self.arrays.highest
         self._renew_collapsing.call(collapsing, body, tetrahedra, len(tetrahedra), highest)

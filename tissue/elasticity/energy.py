@@ -17,18 +17,27 @@ falls, by what the dashpots dissipate. At large strain the shares of what is sto
 dissipated are estimates; their sum is exact.
 """
 
+from typing import NamedTuple
+
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, store_point
-from tissue.core.simd_blocks import load_block, logarithm, splat, sum_of_lanes, width_of
+from tissue.core.simd_blocks import (
+    gathered_like,
+    load_block,
+    logarithm,
+    splat,
+    sum_of_lanes,
+    width_of,
+)
 from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot, vec3
-from tissue.elasticity.averaged_shear import flat_modulus, flatness, shear_energy_of_nodes
+from tissue.elasticity.averaged_shear import averages_of, shear_energy_of_nodes
 from tissue.elasticity.collapse import collapse_energy
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear, n_blocks
 from tissue.elasticity.gradients import known_gradient, shape_of
 from tissue.elasticity.internal_forces import Elastic, Surroundings, viscous_force
-from tissue.elasticity.neo_hookean import NO_VOLUME, deform_solid, dilated_around, own_dilatation
+from tissue.elasticity.neo_hookean import deform_solid, dilated_around, own_dilatation
 from tissue.elasticity.relaxed_stress import (
     PRESSURE,
     relaxed_pressure,
@@ -36,7 +45,7 @@ from tissue.elasticity.relaxed_stress import (
     rows_of_stress,
 )
 from tissue.elasticity.springs import spring_energy
-from tissue.elasticity.stress import cofactors_of
+from tissue.elasticity.stress import MatrixRows, cofactors_of
 from tissue.laws.kernels import (
     complementary_energy,
     stiffens,
@@ -129,23 +138,23 @@ def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
     if averages_shear(solid):
         energy += shear_energy_of_nodes(solid, body.n_nodes)
     if relaxes(solid):
-        energy += relaxed_energy(solid, blocks)
+        energy += relaxed_energy(solid, body)
     return energy
 
 
 @kernel
-def relaxed_energy(solid: Solid, blocks: int) -> float:
+def relaxed_energy(solid: Solid, body: Body) -> float:
     """Return what relaxation adds to the energy of the elastic law, which may be negative [J].
 
-    After `displacement_gradients`.
-
-    Args:
-        solid: The tetrahedra.
-        blocks: How many blocks there are of them.
+    After `deform_solid`.
     """
     energy = 0.0
-    for block in range(blocks):
+    for block in range(n_blocks(solid, body.n_tetrahedra)):
         energy += sum_of_lanes(_relaxed_energies(solid, block))
+    if averages_shear(solid):
+        width = width_of(solid.shape)
+        for block in range((body.n_nodes + width - 1) // width):
+            energy += sum_of_lanes(_relaxed_energies_of_nodes(solid, block))
     return energy
 
 
@@ -153,20 +162,56 @@ def relaxed_energy(solid: Solid, blocks: int) -> float:
 def _relaxed_energies(solid: Solid, block: int) -> Lanes:
     """Return what relaxation adds to the energies of the tetrahedra of a block [J]."""
     width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
-    x, y, z = known_gradient(solid, block)
-    v = shape_of(solid, block, VOLUME)
-    rx, ry, rz = rows_of_stress(solid.relaxed, width * N_RELAXED * block)
+    v, gradient = shape_of(solid, block, VOLUME), known_gradient(solid, block)
+    rows = _Relaxed(solid.relaxed, solid.relaxed_terms, block, 1.0 - solid.law.shear_of_nodes)
+    total = _of_relaxed(solid, rows, gradient)
+    total = total - relaxed_pressure(solid, block) * own_dilatation(solid, block, v)
+    for term in range(n_terms):
+        at = width * (N_RELAXED * (n_terms * block + term) + PRESSURE)
+        r = load_block(solid.relaxed_terms, at)
+        total = total + splat(_bulk_compliance(solid, term), v) * r * r
+    return v * total
+
+
+@inlined
+def _relaxed_energies_of_nodes(solid: Solid, block: int) -> Lanes:
+    """Return what relaxation adds to the energies of the averaged shear of nodes [J]."""
+    first, share = width_of(solid.shape) * block, solid.law.shear_of_nodes
+    gradient, _, _ = averages_of(solid, first)
+    rows = _Relaxed(solid.node_relaxed, solid.node_relaxed_terms, block, share)
+    w = _of_relaxed(solid, rows, gradient)
+    return gathered_like(w, solid.node_volume, solid.every, first) * w
+
+
+class _Relaxed(NamedTuple):
+    """R of a block of tetrahedra, or of nodes."""
+
+    sums: FloatArray
+    """`Solid.relaxed`, or `Solid.node_relaxed`."""
+    terms: FloatArray
+    """The same of each term."""
+    block: int
+    """The block."""
+    share: float
+    """The part of the shear that it is of; of that which is taken back it is an estimate."""
+
+
+@inlined
+def _of_relaxed(solid: Solid, relaxed: _Relaxed, gradient: MatrixRows) -> Lanes:
+    """Return what R adds to the energies of the shear [J/m3], from the rows of H."""
+    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    x, y, z = gradient
+    rx, ry, rz = rows_of_stress(relaxed.sums, width * N_RELAXED * relaxed.block)
     # R : E = R : H + sum over the rows h of H of h . R h / 2
     strained = dot(rx, x) + dot(ry, y) + dot(rz, z)
     squares = _quadratic(x, rx, ry, rz) + _quadratic(y, rx, ry, rz) + _quadratic(z, rx, ry, rz)
-    total = splat(-1.0, v) * (strained + splat(0.5, v) * squares)
-    total = total - relaxed_pressure(solid, block) * own_dilatation(solid, block, v)
+    half = splat(0.5, strained)
+    total = splat(-1.0, strained) * (strained + half * squares)
     for term in range(n_terms):
-        at = width * N_RELAXED * (n_terms * block + term)
-        rx, ry, rz = rows_of_stress(solid.relaxed_terms, at)
-        r = load_block(solid.relaxed_terms, at + width * PRESSURE)
-        total = total + _complementary(solid, term, rx, ry, rz, r)
-    return v * total
+        at = width * N_RELAXED * (n_terms * relaxed.block + term)
+        rows = rows_of_stress(relaxed.terms, at)
+        total = total + _complementary(solid, term, rows, relaxed.share)
+    return total
 
 
 @inlined
@@ -176,25 +221,32 @@ def _quadratic(h: Vec3, rx: Vec3, ry: Vec3, rz: Vec3) -> Lanes:
 
 
 @inlined
-def _complementary(solid: Solid, term: int, rx: Vec3, ry: Vec3, rz: Vec3, r: Lanes) -> Lanes:
-    """Return the complementary energy of a term [J/m3].
+def _complementary(solid: Solid, term: int, rows: MatrixRows, share: float) -> Lanes:
+    """Return the complementary energy of R of a term [J/m3].
 
     Args:
         solid: Moduli and shares.
         term: The term.
-        rx: First row of its R.
-        ry: Second row.
-        rz: Third row.
-        r: Its pressure.
+        rows: Rows of its R.
+        share: The part of the shear that R is of.
     """
-    law, g = solid.law, solid.relaxing_shares[term]
-    mu, modulus = law.shear_modulus, law.lam_of_tetrahedra + law.lam_of_nodes
-    bulk = modulus - law.excess + mu * 2.0 / 3.0
+    law, g = solid.law, share * solid.relaxing_shares[term]
+    mu, (rx, ry, rz) = law.shear_modulus, rows
     trace = rx.x + ry.y + rz.z
-    deviator = dot(rx, rx) + dot(ry, ry) + dot(rz, rz) - splat(1.0 / 3.0, r) * trace * trace
-    y = larger(splat(0.5 / (mu * g) ** 2, r) * deviator, splat(0.0, r))
-    shear = splat(0.5 * mu * g, r) * complementary_energy(law, y)
-    return shear + splat(0.5 * bulk / (g * modulus**2), r) * r * r
+    third = splat(1.0 / 3.0, trace)
+    deviator = dot(rx, rx) + dot(ry, ry) + dot(rz, rz) - third * trace * trace
+    y = larger(splat(0.5 / (mu * g) ** 2, trace) * deviator, splat(0.0, trace))
+    return splat(0.5 * mu * g, trace) * complementary_energy(law, y)
+
+
+@inlined
+def _bulk_compliance(solid: Solid, term: int) -> float:
+    """Return the complementary energy of r of a term over r^2 [1/Pa]."""
+    law, g = solid.law, solid.relaxing_shares[term]
+    modulus = law.lam_of_tetrahedra + law.lam_of_nodes
+    bulk = modulus - law.excess + law.shear_modulus * 2.0 / 3.0
+    compliance: float = 0.5 * bulk / (g * modulus**2)
+    return compliance
 
 
 @inlined
@@ -216,13 +268,7 @@ def _energies(solid: Solid, block: int) -> Lanes:
     ratio = own_dilatation(solid, block, v)
     bulk = dilatation * (ratio + splat(2.0 * (1.0 - law.a), v))
     own = splat(0.5 * law.mu * (1.0 - law.shear_of_nodes), v)
-    energy = own * v * shear + splat(0.5 * law.lam_of_tetrahedra, v) * bulk
-    if averages_shear(solid):
-        flat = flatness(solid, block, v)
-        energy = energy + splat(0.5 * flat_modulus(law), v) * flat * flat / (
-            v + splat(NO_VOLUME, v)
-        )
-    return energy
+    return own * v * shear + splat(0.5 * law.lam_of_tetrahedra, v) * bulk
 
 
 @kernel

@@ -65,6 +65,13 @@ class Solid(Arrays, two_precisions=True):
     rows; empty where no stress relaxes."""
     relaxed_terms: FloatArray = sized((N_RELAXED, "relaxing_terms"), is_for_vectors=True)
     """The same of each term, in blocks of seven rows for each term."""
+    node_relaxed: FloatArray = sized((N_RELAXED, "averaging_relaxing"), is_for_vectors=True)
+    """Stress that has relaxed in the averaged shear of each node, as `relaxed`; its pressure is
+    0."""
+    node_relaxed_terms: FloatArray = sized(
+        (N_RELAXED, "averaging_relaxing_terms"), is_for_vectors=True
+    )
+    """The same of each term."""
     first: IntArray = sized("nodes")
     """Where each node's row begins in the pool, shape (nodes,)."""
     room: IntArray = sized("nodes")
@@ -105,15 +112,17 @@ class Solid(Arrays, two_precisions=True):
     """Scratch, in single precision: H of each tetrahedron, in blocks of nine rows, xx, xy, xz and
     so on."""
     gradient_rows: FloatArray = sized("averaged_behind_a_block", 16, is_for_vectors=True)
-    """Scratch: V H of tetrahedron t [m3], as xx, xy, xz and so on, and V (J - 1), behind a first
-    block of zeros; empty where no shear is averaged (`tissue.elasticity.averaged_shear`)."""
+    """Scratch: V H of tetrahedron t [m3], as xx, xy, xz and so on, V (J - 1) and V q, behind a
+    first block of zeros; empty where no shear is averaged (`tissue.elasticity.averaged_shear`)."""
     node_gradient: FloatArray = sized("averaging_nodes", 16, is_for_vectors=True)
-    """Scratch: H and J - 1 averaged around each node."""
+    """Scratch: H, J - 1 and q averaged around each node."""
     node_stress: FloatArray = sized("averaging_nodes", 16, is_for_vectors=True)
-    """Scratch: the stress and the pressure that these give [Pa]."""
+    """Scratch: the stress and the pressure that these give, and the shear modulus that tetrahedra
+    take back [Pa]."""
     node_stiffness: FloatArray = sized("averaging_nodes", is_for_vectors=True)
-    """Scratch, under laws that stiffen: a bound on the stiffness of the shear there over that at
-    rest."""
+    """Scratch, under laws that stiffen: a bound on the shear modulus there over that at rest."""
+    stiffness_taken: FloatArray = sized("averaging_nodes", is_for_vectors=True)
+    """Scratch: a bound on the shear that tetrahedra take back there, over what is averaged."""
     dilated: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """Scratch: V (J - 1) of tetrahedron t [m3], behind a first block of zeros."""
     growth: FloatArray = sized("behind_a_block", is_for_vectors=True)
@@ -216,10 +225,13 @@ def _sizes(
     width = 2 * WIDTH if is_single else WIDTH
     blocks = (n_tetrahedra + width - 1) // width
     averages = law.shear_of_nodes != 0.0
+    averaging = n_nodes + 2 * WIDTH if averages else 0
     return {
         "nodes": n_nodes,
         "padded_nodes": n_nodes + 2 * WIDTH,
-        "averaging_nodes": n_nodes + 2 * WIDTH if averages else 0,
+        "averaging_nodes": averaging,
+        "averaging_relaxing": averaging if n_terms else 0,
+        "averaging_relaxing_terms": averaging * n_terms,
         "averaged_behind_a_block": width * (1 + blocks) if averages else 0,
         "pool": pool,
         "terms": n_terms,

@@ -36,8 +36,6 @@ from tissue.core.simd_rows import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, axpy, dot, scale
 from tissue.elasticity.averaged_shear import (
     average_around_nodes,
-    flat_modulus,
-    flatness,
     store_gradients,
     stress_of_nodes,
 )
@@ -144,10 +142,11 @@ def _write_gradient(solid: Solid, block: int, has_stiffened: bool, is_averaged: 
     v = shape_of(solid, block, VOLUME)
     dilated = _dilated(v, x, y, z, cofactors)
     store_block(solid.dilated, place, dilated)
+    q = stretch_invariant(x, y, z, *cofactors)
     if is_averaged:
-        store_gradients(solid, block, v, (x, y, z), dilated)
+        store_gradients(solid, block, v, (x, y, z), dilated, q)
     if has_stiffened:
-        factor = stiffening_factor(law, stretch_invariant(x, y, z, *cofactors))
+        factor = stiffening_factor(law, q)
     else:
         factor = isotropic_factor(law, x.x + y.y + z.z, x, y, z)
     store_block(solid.stiffening, place, factor)
@@ -179,7 +178,10 @@ def corner_forces(solid: Solid, begin: int, end: int) -> None:
     Gradients, and what is averaged around nodes, are up to date.
     """
     # Loops of their own, so that the code of each is without a branch.
-    if averages_shear(solid):  # where stress relaxes, none is averaged
+    if averages_shear(solid) and relaxes(solid):
+        for block in range(begin, end):
+            _corner_forces_of(solid, natural(block), True, True)
+    elif averages_shear(solid):
         for block in range(begin, end):
             _corner_forces_of(solid, natural(block), False, True)
     elif relaxes(solid):
@@ -204,7 +206,7 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool, is_averaged: 
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
     if is_averaged:
-        mean, p = stress_of_nodes(solid, block, v)
+        mean, p, taken = stress_of_nodes(solid, block, v)
         p = with_own_pressure(solid, block, v, p)
     else:
         p = pressure_of(solid, block, v)
@@ -220,13 +222,10 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool, is_averaged: 
         rest = splat(0.75 * law.mu, v)
     if is_averaged:
         own = splat(1.0 - law.shear_of_nodes, v)
-        s, rest = own * s, own * rest
+        s, rest = own * s, own * rest + taken
     # The factors of H, K and 1, times -V:
     minus_v = splat(-1.0, v) * v
     a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
-    if is_averaged:
-        push = splat(flat_modulus(law), v) * flatness(solid, block, v)
-        b, c = b + push, c + push
     px, py, pz = stress_of(a, b, c, (x, y, z), cofactors)
     if is_averaged:
         px, py, pz = (
@@ -235,7 +234,7 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool, is_averaged: 
             axpy(minus_v, mean[2], pz),
         )
     if has_relaxed:
-        px, py, pz = with_relaxed(solid, block, v, (px, py, pz), (x, y, z))
+        px, py, pz = with_relaxed(solid.relaxed, width * block, v, (px, py, pz), (x, y, z))
     f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
     f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
     f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))

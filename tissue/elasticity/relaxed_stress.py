@@ -9,6 +9,9 @@ from the first Piola-Kirchhoff stress of the elastic law. r is apart from R sinc
 averaged around nodes: the elastic pressure of a tetrahedron does not follow from its own F, and as
 a part of R it was unstable.
 
+Where a share of the shear is averaged around nodes (`tissue.elasticity.averaged_shear`), nodes keep
+an R of their own, which follows from their F, and takes F R from their stress.
+
 Forces need the sum over all terms, which is kept with the terms.
 """
 
@@ -17,7 +20,13 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import load_block, splat, width_of
 from tissue.core.vec3 import Vec3
-from tissue.elasticity.finite_elements import N_RELAXED, Solid
+from tissue.elasticity.finite_elements import (
+    N_RELAXED,
+    VOLUME,
+    Solid,
+    shape_place,
+    tetrahedron_of_slot,
+)
 
 PRESSURE = 6
 """Place of r among the numbers of a tetrahedron. Before it are xx, yy, zz, yz, xz and xy of R."""
@@ -31,7 +40,7 @@ def relaxes(solid: Solid) -> bool:
 
 @kernel
 def relaxed_place(solid: Solid, t: int, which: int) -> int:
-    """Return where number `which` of tetrahedron `t` is in `relaxed`."""
+    """Return where number `which` of tetrahedron, or node, `t` is in `relaxed`."""
     width = width_of(solid.shape)
     place: int = width * (N_RELAXED * (t // width) + which) + t % width
     return place
@@ -39,7 +48,7 @@ def relaxed_place(solid: Solid, t: int, which: int) -> int:
 
 @kernel
 def relaxed_term_place(solid: Solid, t: int, term: int, which: int) -> int:
-    """Return where number `which` of a term in tetrahedron `t` is in `relaxed_terms`."""
+    """Return where number `which` of a term in tetrahedron, or node, `t` is."""
     width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
     row = N_RELAXED * (n_terms * (t // width) + term) + which
     place: int = width * row + t % width
@@ -67,23 +76,22 @@ def relaxed_pressure(solid: Solid, block: int) -> Lanes:
 
 @inlined
 def with_relaxed(
-    solid: Solid,
-    block: int,
+    relaxed: FloatArray,
+    first: int,
     v: Lanes,
     stress: tuple[Vec3, Vec3, Vec3],
     gradient: tuple[Vec3, Vec3, Vec3],
 ) -> tuple[Vec3, Vec3, Vec3]:
-    """Return -V P less -V F R, from the rows of -V P without it.
+    """Return P + v F R.
 
     Args:
-        solid: The tetrahedra.
-        block: A block of them.
-        v: Their volumes [m3].
-        stress: Rows of -V P [N m].
+        relaxed: `Solid.relaxed`, or `Solid.node_relaxed`.
+        first: First of the tetrahedra, or nodes, of a vector.
+        v: Factor of F R.
+        stress: Rows of P.
         gradient: Rows of H = F - 1.
     """
-    at = width_of(solid.shape) * N_RELAXED * block
-    rx, ry, rz = rows_of_stress(solid.relaxed, at)
+    rx, ry, rz = rows_of_stress(relaxed, N_RELAXED * first)
     px, py, pz = stress
     x, y, z = gradient
     one = splat(1.0, v)
@@ -123,3 +131,33 @@ def inherit_relaxed(solid: Solid, children: IntArray, n: int) -> None:
             for term in range(len(solid.relaxing_shares)):
                 value = solid.relaxed_terms[relaxed_term_place(solid, parent, term, which)]
                 solid.relaxed_terms[relaxed_term_place(solid, child, term, which)] = value
+
+
+@kernel
+def inherit_at_nodes(solid: Solid, nodes: IntArray, n: int) -> None:
+    """Give nodes whose tetrahedra have changed what has relaxed in these, by volume.
+
+    The average of F changes as well. At small strain R of a node is that average, by the ratio of
+    the shares of the shear, in any case.
+
+    Args:
+        solid: Written; the rows of the nodes are up to date.
+        nodes: The nodes.
+        n: How many of them.
+    """
+    n_terms, share = len(solid.relaxing_shares), solid.law.shear_of_nodes
+    share /= 1.0 - share
+    for i in range(n):
+        node = nodes[i]
+        for which in range(PRESSURE):
+            total = 0.0
+            for term in range(n_terms):
+                value = 0.0
+                for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+                    t = tetrahedron_of_slot(solid, slot)
+                    volume = 0.25 * solid.shape[shape_place(solid, t, VOLUME)]
+                    value += volume * solid.relaxed_terms[relaxed_term_place(solid, t, term, which)]
+                value *= share / solid.node_volume[node]
+                solid.node_relaxed_terms[relaxed_term_place(solid, node, term, which)] = value
+                total += value
+            solid.node_relaxed[relaxed_place(solid, node, which)] = total

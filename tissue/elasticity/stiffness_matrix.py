@@ -73,7 +73,7 @@ def masses(mesh: TetrahedralMesh, density: float) -> FloatArray:
 
 
 def stiffness_matrix(
-    mesh: TetrahedralMesh, material: Material, *, averaged: bool = True, element: str = "plain"
+    mesh: TetrahedralMesh, material: Material, *, averaged: bool = True, element: str = "averaged"
 ) -> "csr_array":
     """Return K of the body at rest [N/m], shape (3 n_nodes, 3 n_nodes), x y z of each node in turn.
 

@@ -12,7 +12,8 @@ with the time constant tau_i, as in a Maxwell element (Simo 1987, Comput. Method
     dR_i/dt = (g_i S - R_i) / tau_i        dr_i/dt = (g_i p - r_i) / tau_i
 
 S is the second Piola-Kirchhoff stress of the shear part of the law, p its pressure. All stress
-relaxes: shear and pressure.
+relaxes: shear and pressure. Where a share of the shear is averaged around nodes, these have R and S
+of their own (`tissue.elasticity.averaged_shear`).
 
 R and r are constant while an integrator takes its steps, so that the stages of these see an elastic
 body. After each increment of the time step both continue by its length, by the exact solution where
@@ -29,20 +30,18 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import load_block, splat, store_block, width_of
 from tissue.core.simd_rows import larger, where_larger
-from tissue.core.vec3 import Vec3
-from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid
+from tissue.core.vec3 import Vec3, dot
+from tissue.elasticity.averaged_shear import averages_of, stress_of_nodes, taken_back
+from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear
 from tissue.elasticity.gradients import known_gradient, shape_of
-from tissue.elasticity.neo_hookean import own_dilatation, pressure_of
-from tissue.elasticity.stress import cofactors_of
-from tissue.laws.kernels import stiffens
+from tissue.elasticity.neo_hookean import own_dilatation, pressure_of, with_own_pressure
+from tissue.elasticity.stress import MatrixRows, cofactors_of
+from tissue.laws.energy_density import EnergyDensity
+from tissue.laws.kernels import isotropic_factor, stiffening_factor, stiffens, stretch_invariant
 
 SMALLEST_RATIO = 0.1
 """J below which S is that of a tetrahedron of this J, with less of it: S has the factor 1 / J, and
 a tetrahedron that is turned inside out has none."""
-
-
-_Six = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]
-"""xx, yy, zz, yz, xz and xy of a symmetric matrix."""
 
 
 @kernel
@@ -58,29 +57,62 @@ def relax_blocks(solid: Solid, begin: int, end: int) -> None:
 
     After `prepare_relaxation` and `tissue.elasticity.neo_hookean.deform_solid`.
     """
-    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
     for block in range(begin, end):
-        xx, yy, zz, yz, xz, xy, p = _elastic_stress(solid, block)
-        zero = splat(0.0, p)
-        rxx, ryy, rzz, ryz, rxz, rxy, r = zero, zero, zero, zero, zero, zero, zero
-        for term in range(n_terms):
-            share, weight = solid.relaxing_shares[term], solid.relaxation_weights[term]
-            terms, at = solid.relaxed_terms, width * N_RELAXED * (n_terms * block + term)
-            rxx = rxx + _relaxed(terms, at, share, weight, xx)
-            ryy = ryy + _relaxed(terms, at + width, share, weight, yy)
-            rzz = rzz + _relaxed(terms, at + 2 * width, share, weight, zz)
-            ryz = ryz + _relaxed(terms, at + 3 * width, share, weight, yz)
-            rxz = rxz + _relaxed(terms, at + 4 * width, share, weight, xz)
-            rxy = rxy + _relaxed(terms, at + 5 * width, share, weight, xy)
-            r = r + _relaxed(terms, at + 6 * width, share, weight, p)
-        at = width * N_RELAXED * block
-        store_block(solid.relaxed, at, rxx)
-        store_block(solid.relaxed, at + width, ryy)
-        store_block(solid.relaxed, at + 2 * width, rzz)
-        store_block(solid.relaxed, at + 3 * width, ryz)
-        store_block(solid.relaxed, at + 4 * width, rxz)
-        store_block(solid.relaxed, at + 5 * width, rxy)
-        store_block(solid.relaxed, at + 6 * width, r)
+        stress = _elastic_stress(solid, block)
+        _relax(solid, solid.relaxed, solid.relaxed_terms, block, stress)
+
+
+@kernel
+def relax_nodes(solid: Solid, begin: int, end: int) -> None:
+    """Relax the stress of the nodes from `begin` to `end`, where a share of the shear is theirs.
+
+    As `relax_blocks`; `begin` is the first node of a vector.
+    """
+    width = width_of(solid.shape)
+    for block in range(begin // width, (end + width - 1) // width):
+        stress = _elastic_stress_of_nodes(solid, block)
+        _relax(solid, solid.node_relaxed, solid.node_relaxed_terms, block, stress)
+
+
+@inlined
+def _relax(
+    solid: Solid,
+    relaxed: FloatArray,
+    terms: FloatArray,
+    block: int,
+    stress: tuple[Vec3, Vec3, Lanes],
+) -> None:
+    """Move what has relaxed in a block towards its limit.
+
+    Args:
+        solid: The Prony series.
+        relaxed: R and r of tetrahedra, or of nodes; written.
+        terms: Those of each term; written.
+        block: A block of these.
+        stress: xx, yy, zz and yz, xz, xy of S, and p [Pa].
+    """
+    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    along, across, p = stress
+    zero = splat(0.0, p)
+    rxx, ryy, rzz, ryz, rxz, rxy, r = zero, zero, zero, zero, zero, zero, zero
+    for term in range(n_terms):
+        share, weight = solid.relaxing_shares[term], solid.relaxation_weights[term]
+        at = width * N_RELAXED * (n_terms * block + term)
+        rxx = rxx + _relaxed(terms, at, share, weight, along.x)
+        ryy = ryy + _relaxed(terms, at + width, share, weight, along.y)
+        rzz = rzz + _relaxed(terms, at + 2 * width, share, weight, along.z)
+        ryz = ryz + _relaxed(terms, at + 3 * width, share, weight, across.x)
+        rxz = rxz + _relaxed(terms, at + 4 * width, share, weight, across.y)
+        rxy = rxy + _relaxed(terms, at + 5 * width, share, weight, across.z)
+        r = r + _relaxed(terms, at + 6 * width, share, weight, p)
+    at = width * N_RELAXED * block
+    store_block(relaxed, at, rxx)
+    store_block(relaxed, at + width, ryy)
+    store_block(relaxed, at + 2 * width, rzz)
+    store_block(relaxed, at + 3 * width, ryz)
+    store_block(relaxed, at + 4 * width, rxz)
+    store_block(relaxed, at + 5 * width, rxy)
+    store_block(relaxed, at + 6 * width, r)
 
 
 @inlined
@@ -101,40 +133,93 @@ def _relaxed(terms: FloatArray, at: int, share: float, weight: float, stress: La
 
 
 @inlined
-def _elastic_stress(solid: Solid, block: int) -> tuple[*_Six, Lanes]:
-    """Return xx, yy, zz, yz, xz and xy of S, and p, of the tetrahedra of a block [Pa].
+def _elastic_stress(solid: Solid, block: int) -> tuple[Vec3, Vec3, Lanes]:
+    """Return xx, yy, zz and yz, xz, xy of S, and p, of the tetrahedra of a block [Pa].
 
-    With K = cof F - 1, (cof F)^T cof F = 1 + K + K^T + K^T K: nothing is lost at small strain.
+    Without what of their shear is averaged around nodes.
+    """
+    v = shape_of(solid, block, VOLUME)
+    own = splat(1.0 - solid.law.shear_of_nodes, v)
+    factor = load_block(solid.stiffening, width_of(solid.shape) * (1 + block))
+    c, s = _moduli(solid.law, factor)
+    c, s = own * c, own * s
+    if averages_shear(solid):
+        _, p, taken = stress_of_nodes(solid, block, v)
+        p, c = with_own_pressure(solid, block, v, p), c + taken
+    else:
+        p = pressure_of(solid, block, v)
+    dilatation = own_dilatation(solid, block, v)
+    along, across = _shear_stress(c, s, known_gradient(solid, block), dilatation)
+    return along, across, p
+
+
+@inlined
+def _elastic_stress_of_nodes(solid: Solid, block: int) -> tuple[Vec3, Vec3, Lanes]:
+    """Return xx, yy, zz and yz, xz, xy of S of the averaged shear of a block of nodes, and 0 [Pa].
+
+    From the averages of F, less what tetrahedra take back.
     """
     law = solid.law
-    x, y, z = known_gradient(solid, block)
-    v = shape_of(solid, block, VOLUME)
+    gradient, _, averaged_q = averages_of(solid, width_of(solid.shape) * block)
+    x, y, z = gradient
+    cx, cy, cz = cofactors_of(x, y, z)
+    q = stretch_invariant(x, y, z, cx, cy, cz)
+    trace = x.x + y.y + z.z
+    stiff = stiffens(law)
+    factor = stiffening_factor(law, q) if stiff else isotropic_factor(law, trace, x, y, z)
+    c, s = _moduli(law, factor)
+    taken, _ = taken_back(averaged_q, q)
+    share = splat(law.shear_of_nodes, q)
+    c, s = share * (c - splat(law.shear_modulus, q) * taken), share * s
+    dilatation = trace + (cx.x + cy.y + cz.z) + dot(x, cx)
+    along, across = _shear_stress(c, s, gradient, dilatation)
+    return along, across, splat(0.0, q)
+
+
+@inlined
+def _moduli(law: EnergyDensity, factor: Lanes) -> tuple[Lanes, Lanes]:
+    """Return c and s [Pa] of the shear part c (F - cof F) + s F from `Solid.stiffening`."""
+    if stiffens(law):
+        return splat(law.mu, factor) * factor, splat(0.0, factor)
+    return splat(0.75 * law.mu, factor), factor
+
+
+@inlined
+def _shear_stress(c: Lanes, s: Lanes, gradient: MatrixRows, dilatation: Lanes) -> tuple[Vec3, Vec3]:
+    """Return xx, yy, zz and yz, xz, xy of S [Pa].
+
+    With K = cof F - 1, (cof F)^T cof F = 1 + K + K^T + K^T K: nothing is lost at small strain.
+
+    Args:
+        c: See above [Pa].
+        s: See above [Pa].
+        gradient: Rows of H.
+        dilatation: J - 1 of these.
+    """
+    x, y, z = gradient
     cx, cy, cz = cofactors_of(x, y, z)
     trace = x.x + y.y + z.z
-    factor = load_block(solid.stiffening, width_of(solid.shape) * (1 + block))
-    if stiffens(law):
-        c = splat(law.mu, v) * factor
-        s = splat(0.0, v)
-    else:
-        c, s = splat(0.75 * law.mu, v), factor
     # The columns of K = (tr H) 1 - H^T + cof H:
     a = Vec3(trace - x.x + cx.x, cy.x - x.y, cz.x - x.z)
     b = Vec3(cx.y - y.x, trace - y.y + cy.y, cz.y - y.z)
     d = Vec3(cx.z - z.x, cy.z - z.y, trace - z.z + cz.z)
-    dilatation = own_dilatation(solid, block, v)
-    ratio = splat(1.0, v) + dilatation
-    inverse = splat(1.0, v) / larger(ratio, splat(SMALLEST_RATIO, v))
-    inverse = where_larger(ratio, splat(0.0, v), inverse, splat(0.0, v))
+    one, zero = splat(1.0, trace), splat(0.0, trace)
+    ratio = one + dilatation
+    inverse = one / larger(ratio, splat(SMALLEST_RATIO, trace))
+    inverse = where_larger(ratio, zero, inverse, zero)
     of_c = c * inverse
-    own = (
+    minus = splat(-1.0, trace) * of_c
+    along = Vec3(
         of_c * (dilatation - _sum_and_product(a.x, a.x, a, a)) + s,
         of_c * (dilatation - _sum_and_product(b.y, b.y, b, b)) + s,
         of_c * (dilatation - _sum_and_product(d.z, d.z, d, d)) + s,
-        splat(-1.0, v) * of_c * _sum_and_product(b.z, d.y, b, d),
-        splat(-1.0, v) * of_c * _sum_and_product(a.z, d.x, a, d),
-        splat(-1.0, v) * of_c * _sum_and_product(a.y, b.x, a, b),
     )
-    return *own, pressure_of(solid, block, v)
+    across = Vec3(
+        minus * _sum_and_product(b.z, d.y, b, d),
+        minus * _sum_and_product(a.z, d.x, a, d),
+        minus * _sum_and_product(a.y, b.x, a, b),
+    )
+    return along, across
 
 
 @inlined

@@ -23,7 +23,7 @@ from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.energy import dissipated_power, relaxed_energy
-from tissue.elasticity.finite_elements import n_blocks
+from tissue.elasticity.finite_elements import averages_shear
 from tissue.elasticity.neo_hookean import has_averages
 from tissue.elasticity.viscoelasticity import prepare_relaxation
 from tissue.forces.rigid_motion import add_rigid_part
@@ -34,6 +34,7 @@ from tissue.integrators.node_loops import (
     DAMPING_CHANGES,
     DISPLACEMENTS,
     GRADIENTS,
+    NODE_RELAXATION,
     STRESS_RELAXATION,
     run_loop,
 )
@@ -153,13 +154,14 @@ def relax_stress(context: StepContext, seconds: float) -> None:
     """
     solid = context.elastic.solid
     is_counted = context.damping.is_counted == 1
-    blocks = n_blocks(solid, context.body.n_tetrahedra)
     prepare_relaxation(solid, seconds)
     run_loop(context, DISPLACEMENTS, 0.0)
     run_loop(context, GRADIENTS, 0.0)
     if has_averages(solid):
         run_loop(context, AVERAGES, 0.0)
-    before = relaxed_energy(solid, blocks) if is_counted else 0.0
+    before = relaxed_energy(solid, context.body) if is_counted else 0.0
     run_loop(context, STRESS_RELAXATION, 0.0)
+    if averages_shear(solid):
+        run_loop(context, NODE_RELAXATION, 0.0)
     if is_counted:
-        context.damping.dissipated += before - relaxed_energy(solid, blocks)
+        context.damping.dissipated += before - relaxed_energy(solid, context.body)

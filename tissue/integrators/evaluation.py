@@ -3,6 +3,7 @@
 from tissue.blade.edge import Edge
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
+from tissue.elasticity.finite_elements import averages_shear
 from tissue.elasticity.neo_hookean import has_averages
 from tissue.forces.step_context import Instant, StepContext
 from tissue.forces.terms import add_reactions, add_terms
@@ -44,6 +45,8 @@ def _deform(context: StepContext, loop_of_displacements: int) -> None:
             run_loop(context, loop_of_displacements, 0.0)
         if loop_of_displacements != DEFORMED:
             run_loop(context, GRADIENTS, 0.0)
-        if has_averages(solid):
+        if has_averages(solid) and not (
+            loop_of_displacements == DEFORMED and averages_shear(solid)
+        ):
             run_loop(context, AVERAGES, 0.0)
         run_loop(context, CORNER_FORCES, 0.0)

@@ -22,26 +22,26 @@ from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.gradients import displacements
 from tissue.elasticity.internal_forces import viscous_force
 from tissue.elasticity.neo_hookean import average_volumes, corner_forces, displacement_gradients
-from tissue.elasticity.viscoelasticity import relax_blocks
+from tissue.elasticity.viscoelasticity import relax_blocks, relax_nodes
 from tissue.forces.acceleration import acceleration, acceleration_of, is_solid
 from tissue.forces.step_context import Stages, StepContext
 from tissue.mesh.body import Body
 
 GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
 """Loops over blocks of tetrahedra."""
-DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, AVERAGES = 3, 4, 5, 6
+DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, AVERAGES, NODE_RELAXATION = 3, 4, 5, 6, 7
 """Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
 DISPLACED = -1
 """Stands for a loop of displacements where the loop before has written them."""
 DEFORMED = -2
-"""Stands for it where gradients are known, too (`Solid.are_gradients_known`)."""
-FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 7, 8, 9, 10
+"""Stands for it where gradients are known (`Solid.are_gradients_known`), and averaged shear."""
+FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 8, 9, 10, 11
 """Loops over nodes of the Runge-Kutta method on two levels."""
-NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 11, 12, 13
+NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 12, 13, 14
 """Loops over nodes of the method of three stages."""
-DRIFTING, KICKING = 14, 15
+DRIFTING, KICKING = 15, 16
 """Loops over nodes of position Verlet."""
-DAMPING_CHANGES = 16
+DAMPING_CHANGES = 17
 """The loop over nodes of damping between steps."""
 
 BLOCKS_OF_A_CHUNK = 32
@@ -142,6 +142,8 @@ def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
         relax_blocks(solid, begin, end)
     elif loop == AVERAGES:
         average_volumes(solid, begin, end)
+    elif loop == NODE_RELAXATION:
+        relax_nodes(solid, begin, end)
     else:
         positions = body.positions
         if loop == DISPLACEMENTS_2:

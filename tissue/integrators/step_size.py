@@ -272,7 +272,6 @@ def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLi
 
 @kernel
 def _average(context: StepContext) -> None:
-    """Find the stiffness of averaged shear, under laws that stiffen."""
-    solid = context.elastic.solid
-    if stiffens(solid.law) and averages_shear(solid):
+    """Find the stiffness of averaged shear."""
+    if averages_shear(context.elastic.solid):
         run_loop(context, AVERAGES, 0.0)

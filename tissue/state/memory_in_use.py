@@ -166,6 +166,10 @@ def _of_solid(solid: Any, body: Arrays) -> Iterable[RowsInUse]:
     for field, elements in _IN_BLOCKS.items():
         yield RowsInUse(solid, field, n, elements, width)
     yield RowsInUse(solid, "relaxed_terms", n, 7 * len(solid.relaxation_times), width)
+    if len(solid.node_relaxed):
+        nodes, terms = (body, "n_nodes"), 7 * len(solid.relaxation_times)
+        yield RowsInUse(solid, "node_relaxed", nodes, 7, width)
+        yield RowsInUse(solid, "node_relaxed_terms", nodes, terms, width)
     for field in _BEHIND_A_BLOCK:
         yield RowsInUse(solid, field, n, 1, width, lead=width)
 

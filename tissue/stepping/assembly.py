@@ -72,7 +72,7 @@ def assembled(
         mass_scaling=solver.mass_scaling,
         damps_between_steps=method.damps_between_steps,
         is_single=solver.precision == "single",
-        averages_shear=solver.element == "averaged",
+        averages_shear=solver.element == "averaged" and not material.law.has_springs,
         moves_together=not isinstance(options, Hierarchical),
     )
     model = TissueModel(body, material, weight, blade, floor, numerics)
@@ -193,12 +193,6 @@ def _checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpt
             raise ValueError(
                 f"{name} is {getattr(solver, name)!r}; it must be one of {', '.join(choices)}"
             )
-    if solver.element == "averaged" and (material.law.has_springs or material.prony):
-        why = "springs carry the shear" if material.law.has_springs else "its stress relaxes"
-        raise ValueError(
-            f"element is 'averaged', which this material cannot have: {why}. Use element='plain', "
-            "or another law without prony"
-        )
     if solver.mass_scaling is not None and not solver.mass_scaling > 0.0:
         raise ValueError(
             f"mass_scaling is {solver.mass_scaling}; it is an angular frequency [1/s] and must be "

@@ -109,7 +109,7 @@ def height_at_rest(load: float, across: int = _ACROSS) -> float:
         _SILICONE,
         fixed=fixed_nodes(mesh, "left"),
         gravity=(0.0, 0.0, -GRAVITY),
-        solver=SolverSettings(relaxation="verlet", element="averaged"),
+        solver=SolverSettings(relaxation="verlet"),
     )
     if load:
         tissue.push(_edge(mesh), (0.0, 0.0, -load))
@@ -132,7 +132,6 @@ def let_go(load: float, rest: float, across: int = _ACROSS) -> Swing:
         silicone,
         fixed=fixed_nodes(mesh, "left"),
         gravity=(0.0, 0.0, -GRAVITY),
-        solver=SolverSettings(element="averaged"),
     )
     tip = tissue.material_points(_TIP)
     thread = (

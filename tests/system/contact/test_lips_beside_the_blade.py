@@ -27,11 +27,17 @@ def test_a_floor_far_below_changes_no_bit_of_a_cut(settles):
         np.testing.assert_array_equal(one, other)
 
 
-def test_lips_of_a_squeezed_block_overlap_no_more_with_the_blade_between_them_than_later():
-    """Contact as forces leaves 10 to 40 um in the median; without contact it is up to 1.4 mm."""
+@pytest.mark.parametrize(("element", "most"), [("plain", 0.005), ("averaged", 0.012)])
+def test_lips_of_a_squeezed_block_overlap_no_more_with_the_blade_between_them_than_later(
+    element, most
+):
+    """Contact as forces leaves 10 to 40 um in the median; without contact it is up to 1.4 mm.
+
+    Averaged shear yields more where lips are crumpled: 0.1 mm in the first of the frames.
+    """
     at, mesh = 0.37, block((4, 4, 4), (0.04,) * 3)
-    squeezed = mesh.positions * (0.9, 1.0, 1.0)
-    tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), positions=squeezed)
+    squeezed, solver = mesh.positions * (0.9, 1.0, 1.0), SolverSettings(element=element)
+    tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), positions=squeezed, solver=solver)
     tissue.settle()
     moved = TetrahedralMesh(tissue.snapshot().positions, mesh.tetrahedra)
     meanwhile, later = [], []
@@ -47,7 +53,7 @@ def test_lips_of_a_squeezed_block_overlap_no_more_with_the_blade_between_them_th
         (meanwhile if held else later).append(np.median(depths))
         assert not held or result.body_contacts.n_contacts > 10
     assert len(meanwhile) > 8 and len(later) > 5
-    assert max(meanwhile) < max(0.005 * ELEMENT, 1.2 * max(later))
+    assert max(meanwhile) < max(most * ELEMENT, 1.2 * max(later))
 
 
 def free_block(law, relaxation):

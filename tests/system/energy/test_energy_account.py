@@ -129,13 +129,14 @@ def test_a_cut_takes_motion_and_gives_none(account):
 
 
 def test_finer_tetrahedra_hold_little_more_elastic_energy_and_never_less(account):
-    """Measured 0.2 % of the work, for pressure is a mean around nodes; springs 1.3 %."""
+    """Measured 0.5 to 0.8 % of the work, for pressure and shear are means around nodes, which a cut
+    divides; springs 1.3 %."""
     added = account.added("elastic")
     if account.is_of_springs:
         assert 0.0 < added.sum() < 0.03
         assert added[added < 0.0].sum() > -1e-3
     else:
-        assert 0.0 < added.sum() < 0.004
+        assert 0.0 < added.sum() < 0.01
         assert added.min() > -1e-9
 
 

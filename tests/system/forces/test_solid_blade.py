@@ -91,7 +91,7 @@ def test_a_tip_pierces_at_toughness_times_height_and_pays_for_it():
     area = SHAPE.height * 59 * 0.05 * strokes.DT
     assert last.cutting - results[-60].energies.cutting == pytest.approx(20.0 * area, rel=0.05)
     assert work == pytest.approx(20.0 * area, rel=0.1)
-    assert abs(last.residual) < 1e-3 * last.work_of_blade
+    assert abs(last.residual) < 2e-3 * last.work_of_blade
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

@@ -14,31 +14,27 @@ from tissue.mesh.changes import clear_changes
 pytestmark = pytest.mark.kernel
 
 PRONY = ((0.3, 0.1), (0.2, 5.0), (0.1, 0.02))
-SOLIDS = {name: LAWS[name] for name in ("averaged", "plain", "exponential", "yeoh")}
+SOLIDS = {
+    name: LAWS[name]
+    for name in (
+        *("averaged", "plain", "exponential", "yeoh"),
+        *("averaged shear", "averaged exponential", "averaged yeoh"),
+    )
+}
 MESH = bodies.jittered_grid(2, 3)
 STRAIN = np.array([[1.2, 0.3, 0.0], [0.05, 0.9, 0.1], [0.0, -0.1, 1.05]])
 HELD = MESH.positions @ STRAIN.T
 
 
-def elastic_parts(mesh, positions, law):
-    """Return the second Piola-Kirchhoff stress of the shear part, and the pressure [Pa].
-
-    Shapes (n_tets, 3, 3) and (n_tets,). The pressure is that of the whole stress less what the
-    shear part takes to be zero at rest.
-    """
-    f = naive_solid.gradients(mesh, positions)
-    j = np.linalg.det(f)
-    p = law.lam_of_tetrahedra * (j - 1.0)
+def pressure(mesh, positions, law):
+    """Return the elastic pressure of each tetrahedron [Pa]."""
+    j = np.linalg.det(naive_solid.gradients(mesh, positions))
     of_nodes = law.lam_of_nodes * (naive_solid.averaged_j(mesh, positions) - 1.0)
-    p = p + of_nodes[mesh.tetrahedra].mean(axis=1)
-    inverse = np.linalg.inv(f)
-    cofactors = j[:, None, None] * inverse.transpose(0, 2, 1)
-    shear = naive_solid.stresses(mesh, positions, law) - p[:, None, None] * cofactors
-    return inverse @ shear, p
+    return law.lam_of_tetrahedra * (j - 1.0) + of_nodes[mesh.tetrahedra].mean(axis=1)
 
 
 class Relaxation:
-    """The slow twin: what has relaxed in each tetrahedron of a mesh.
+    """The slow twin: what has relaxed in each tetrahedron of a mesh, and at each node.
 
     Args:
         mesh: The body at rest.
@@ -50,15 +46,22 @@ class Relaxation:
         self.mesh, self.law, self.prony = mesh, law, prony
         n = len(mesh.tetrahedra)
         self.stress = np.zeros((len(prony), n, 3, 3))
+        self.of_nodes = np.zeros((len(prony), len(mesh.positions), 3, 3))
         self.pressure = np.zeros((len(prony), n))
 
     def relax(self, positions, seconds):
         """Let stress relax at those positions [m] for that time [s]."""
-        stress, pressure = elastic_parts(self.mesh, positions, self.law)
+        of = self.mesh, positions
+        by_nodes = naive_solid.shear_stress_of_nodes(*of, self.law)
+        own = naive_solid.shear_stress_of_tetrahedra(*of, self.law)
+        stress = np.linalg.inv(naive_solid.gradients(*of)) @ own
+        of_nodes = np.linalg.inv(naive_solid.averaged_gradients(*of)) @ by_nodes
+        elastic_pressure = pressure(*of, self.law)
         for i, (share, time) in enumerate(self.prony):
             left = np.exp(-seconds / time)
             self.stress[i] = left * self.stress[i] + (1.0 - left) * share * stress
-            self.pressure[i] = left * self.pressure[i] + (1.0 - left) * share * pressure
+            self.of_nodes[i] = left * self.of_nodes[i] + (1.0 - left) * share * of_nodes
+            self.pressure[i] = left * self.pressure[i] + (1.0 - left) * share * elastic_pressure
 
     def forces(self, positions):
         """Return the forces on the nodes [N]."""
@@ -67,6 +70,8 @@ class Relaxation:
         j = np.linalg.det(f)[:, None, None]
         cofactors = j * np.linalg.inv(f).transpose(0, 2, 1)
         whole = naive_solid.stresses(mesh, positions, self.law) - f @ self.stress.sum(axis=0)
+        mean = naive_solid.averaged_gradients(mesh, positions) @ self.of_nodes.sum(axis=0)
+        whole = whole - mean[mesh.tetrahedra].mean(axis=1)
         whole = whole - self.pressure.sum(axis=0)[:, None, None] * cofactors
         normals = np.linalg.inv(naive_solid.edges(*mesh))  # rows: gradients of N1, N2, N3
         of_corners = -naive_solid.volumes(mesh)[:, None, None] * (

@@ -23,7 +23,6 @@ from typing import NamedTuple
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
-from tissue.elasticity.averaged_shear import FLAT_MODULUS, J_LIMIT
 from tissue.elasticity.finite_elements import (
     Solid,
     averages_shear,
@@ -278,16 +277,16 @@ def bounds_of_node(
             + solid.weight[solid.nodes[node_place(solid, t, 3)]] * norm(n3)
         )
         at_rest = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
-        normal, flat = at_rest, 0.0
+        length = norm(at_rest)
+        share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
+        normal = at_rest
         if is_strained:
-            n1, n2, n3, now = normals(body, points, t)
+            n1, n2, n3, _ = normals(body, points, t)
             normal = n1 if k == 1 else (n2 if k == 2 else n3)
             if k == 0:
                 normal = scale(-1.0, add(n1, add(n2, n3)))
-            if averages_shear(solid) and now < J_LIMIT * volume:
-                flat = FLAT_MODULUS * law.shear_modulus
-        length = norm(at_rest)
-        share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
+            if averages_shear(solid):
+                isotropic += law.shear_modulus * _share_taken(solid, t) * share * length
         if has_stiffened:
             place = solid.around[slot]
             isotropic += float(solid.stiffening[place]) * mu * share * length
@@ -296,7 +295,7 @@ def bounds_of_node(
             stiffness = add_square(stiffness, slope, along)
         else:
             isotropic += mu * share * length
-        c = (mu + lam + flat) * share / length
+        c = (mu + lam) * share / length
         stiffness = add_square(stiffness, c, normal)
         if averaged:
             for other in range(4):
@@ -312,6 +311,15 @@ def bounds_of_node(
             c = (1.0 + shear_of_lam) * dilatation[solid.ring_nodes[i]] / (weight * length)
             stiffness = add_square(stiffness, c, normal)
     return NodeBounds((isotropic + largest_eigenvalue(stiffness)) / mass, isotropic / mass)
+
+
+@inlined
+def _share_taken(solid: Solid, t: int) -> float:
+    """Return the stiffness of averaged shear that a tetrahedron takes back, over that at rest."""
+    total = 0.0
+    for k in range(4):
+        total += float(solid.stiffness_taken[solid.nodes[node_place(solid, t, k)]])
+    return 0.25 * total * solid.law.shear_of_nodes
 
 
 @inlined

@@ -2,7 +2,8 @@
 
 Where a tetrahedron is stretched, its faces grow, and pressure acts on a larger face: the stiffness
 against a change of volume grows as the square of the area of the face opposite the node that moves.
-The shear part of the law never gets stiffer than at rest, unless the law stiffens. So a bound on
+The shear part of the law never gets stiffer than at rest, unless the law stiffens, or tetrahedra
+take averaged shear back (`tissue.elasticity.averaged_shear`). So a bound on
 w^2 is that at rest times the largest growth of the square of a face, at least 1. For random
 deformations up to twice the length and half of it, at Poisson's ratios from 0.3 to 0.49, that was
 1.6 to 10 times the true w^2.
@@ -16,11 +17,11 @@ from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import gathered_like, load_block, splat, store_block, width_of
 from tissue.core.simd_rows import any_above, larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, cross, dot
-from tissue.elasticity.averaged_shear import FLAT_MODULUS, J_LIMIT, mean_stiffness
+from tissue.elasticity.averaged_shear import mean_of_nodes
 from tissue.elasticity.finite_elements import Solid, averages_shear, n_blocks
 from tissue.elasticity.gradients import gradient_of_displacement, gradient_of_shape, known_gradient
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.stress import cofactors_of, shear_stiffness
+from tissue.elasticity.stress import MatrixRows, cofactors_of, shear_stiffness
 from tissue.laws.kernels import (
     stiffening_factor,
     stiffens,
@@ -34,9 +35,10 @@ With 1, tetrahedra near the limit at rest would be tested wherever they are stre
 get mass."""
 
 
-FLAT_GROWTH = FLAT_MODULUS / (4.0 / 3.0)
-"""The modulus of flat tetrahedra over that of their shear against the motion of one node, which is
-the least that they have at rest."""
+@inlined
+def has_stiffness(solid: Solid) -> bool:
+    """Return whether the shear of tetrahedra can be stiffer than at rest."""
+    return stiffens(solid.law) or averages_shear(solid)
 
 
 @kernel
@@ -58,14 +60,13 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
         one, least = splat(1.0, room), splat(UNNOTICED, room)
         # Where the bound at rest is above the limit, any growth counts.
         least = where_larger(one, room, room, least)
-        if stiffens(law):
+        if has_stiffness(solid):
             stiffness = _write_stiffness(solid, block, x, y, z, is_known)
-            room = room - load_block(solid.shear_share, place) * stiffness
+            more = stiffness if stiffens(law) else stiffness - one
+            room = room - load_block(solid.shear_share, place) * more
             least = where_larger(stiffness, least, room, least)
         cofactors = _cofactors(x, y, z)
         room = larger(room, least)
-        if averages_shear(solid):
-            room = room - _growth_of_flat(x, cofactors)
         if _grows_further(solid, block, cofactors, room):
             solid.fast_blocks[n] = block
             n += 1
@@ -75,7 +76,7 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
 @kernel
 def quick_bounds_of_one(elastic: Elastic, block: int, is_known: bool) -> None:
     """Write quick bounds on w^2 of a block before `list_fast_blocks`."""
-    if stiffens(elastic.solid.law):
+    if has_stiffness(elastic.solid):
         x, y, z = _gradient(elastic.solid, block, is_known)
         _write_stiffness(elastic.solid, block, x, y, z, is_known)
     quick_bounds(elastic, block, is_known)
@@ -88,17 +89,14 @@ def quick_bounds(elastic: Elastic, block: int, is_known: bool) -> float:
     What was found at a test grows as the faces do, or the stiffness.
     """
     solid = elastic.solid
-    law, place = solid.law, width_of(solid.shape) * (1 + block)
+    place = width_of(solid.shape) * (1 + block)
     x, y, z = _gradient(solid, block, is_known)
-    cofactors = _cofactors(x, y, z)
-    growth = _growth(solid, block, cofactors)
-    if averages_shear(solid):
-        growth = growth + _growth_of_flat(x, cofactors)
+    growth = _growth(solid, block, _cofactors(x, y, z))
     at_rest = _highest_with_contact(elastic, solid, block, growth)
     bound = growth * at_rest
     further = growth / load_block(solid.tested_growth, place)
     largest_growth = growth
-    if stiffens(law):
+    if has_stiffness(solid):
         stiffness = load_block(solid.stiffness, place)
         bound = bound + larger(stiffness - growth, splat(0.0, growth)) * _highest_at_rest(
             solid.shear_frequency_squared, solid, block, growth
@@ -177,19 +175,6 @@ def _growth(solid: Solid, block: int, cofactors: tuple[Vec3, Vec3, Vec3]) -> Lan
 
 
 @inlined
-def _growth_of_flat(x: Vec3, cofactors: tuple[Vec3, Vec3, Vec3]) -> Lanes:
-    """Return what the resistance of flat tetrahedra adds to the bound at rest, as a share of it.
-
-    Args:
-        x: First row of H.
-        cofactors: Rows of cof F.
-    """
-    one = splat(1.0, x.x)
-    j = dot(Vec3(x.x + one, x.y, x.z), cofactors[0])
-    return where_larger(splat(J_LIMIT, j), j, splat(FLAT_GROWTH, j), splat(0.0, j))
-
-
-@inlined
 def _grows_further(
     solid: Solid, block: int, cofactors: tuple[Vec3, Vec3, Vec3], room: Lanes
 ) -> bool:
@@ -223,7 +208,7 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, is_kno
 
     It is returned.
 
-    Of a share of the shear it is that at the nodes (`tissue.elasticity.averaged_shear`).
+    Of averaged shear it is that at the nodes, and what tetrahedra take back.
 
     Args:
         solid: Written.
@@ -233,18 +218,33 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, is_kno
         z: Third row.
         is_known: Whether `displacement_gradients` has found g.
     """
-    cofactors = cofactors_of(x, y, z)
-    q = stretch_invariant(x, y, z, *cofactors)
+    place = width_of(solid.shape) * (1 + block)
+    if stiffens(solid.law):
+        stiffness = _stiffness_of_law(solid, block, (x, y, z), is_known)
+    else:
+        stiffness = splat(1.0, x.x)
+    if averages_shear(solid):
+        of_nodes = splat(solid.law.shear_of_nodes, x.x)
+        taken = mean_of_nodes(solid.stiffness_taken, solid, block, x.x)
+        if stiffens(solid.law):
+            of_averages = mean_of_nodes(solid.node_stiffness, solid, block, x.x)
+            taken = taken + (of_averages - stiffness)
+        stiffness = stiffness + of_nodes * taken
+    store_block(solid.stiffness, place, stiffness)
+    return stiffness
+
+
+@inlined
+def _stiffness_of_law(solid: Solid, block: int, gradient: MatrixRows, is_known: bool) -> Lanes:
+    """Return the stiffness under a law that stiffens; see `_write_stiffness`."""
+    cofactors = cofactors_of(*gradient)
+    q = stretch_invariant(*gradient, *cofactors)
     place = width_of(solid.shape) * (1 + block)
     if not is_known:
         store_block(solid.stiffening, place, stiffening_factor(solid.law, q))
     g = load_block(solid.stiffening, place)
-    stiffness, slope = shear_stiffness(solid.law, q, g, (x, y, z), cofactors)
+    stiffness, slope = shear_stiffness(solid.law, q, g, gradient, cofactors)
     store_block(solid.stiffening_slope, place, slope)
-    if averages_shear(solid):
-        of_nodes = splat(solid.law.shear_of_nodes, g)
-        stiffness = stiffness + of_nodes * (mean_stiffness(solid, block, g) - stiffness)
-    store_block(solid.stiffness, place, stiffness)
     return stiffness
 
 

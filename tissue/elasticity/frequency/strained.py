@@ -31,6 +31,7 @@ from tissue.elasticity.finite_elements import (
 )
 from tissue.elasticity.frequency.at_rest import bounds_of_node, dilatation_term
 from tissue.elasticity.frequency.quick import (
+    has_stiffness,
     list_fast_blocks,
     quick_bounds,
     quick_bounds_of_one,
@@ -38,7 +39,6 @@ from tissue.elasticity.frequency.quick import (
 from tissue.elasticity.gradients import displacements
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import deform_solid
-from tissue.laws.kernels import stiffens
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
@@ -91,13 +91,13 @@ def strained_frequency(
         visits: For searches.
         limit: It need not be nearer to the truth than the number of steps requires. The bound is
             not below what they allow where the tetrahedra are.
-        is_known: Whether `displacement_gradients` was run there, and gradients are kept; under laws
-            that stiffen averages as well.
+        is_known: Whether `displacement_gradients` was run there, and gradients are kept; where
+            shear is averaged `average_around_nodes` as well.
     """
     solid = elastic.solid
     solid.test += 1
     if not is_known:
-        if averages_shear(solid) and stiffens(solid.law):
+        if averages_shear(solid):
             deform_solid(solid, body, points)
         else:
             displacements(solid, body, points, 0, body.n_nodes)
@@ -199,7 +199,7 @@ def is_as_tested(solid: Solid, place: int) -> bool:
         return False
     further = solid.growth[place] / solid.tested_growth[place]
     is_near: bool = 1.0 / FURTHER <= further <= FURTHER
-    if stiffens(solid.law):
+    if has_stiffness(solid):
         further = solid.stiffness[place] / solid.tested_stiffness[place]
         is_near = is_near and 1.0 / FURTHER <= further <= FURTHER
     return is_near
