@@ -32,8 +32,9 @@ class TissueError(RuntimeError):
 class RigidContacts(NamedTuple):
     """Where the blade and rigid geoms act on the tissue. Valid until the next step.
 
-    First the samples of the edge that hold tissue, then the points of the tissue that touch the
-    faces of the blade: views, at the end of the step. Then contacts with geoms, averaged over it.
+    First the samples of the edge that hold tissue, or have cut some in the step, then the points of
+    the tissue that touch the faces of the blade: views, at the end of the step. Then contacts with
+    geoms, averaged over it.
     """
 
     point: FloatArray

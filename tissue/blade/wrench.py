@@ -197,11 +197,14 @@ def _report_edge(
     anchors, forward = blade.anchors, pose.forward
     n = len(anchors.state)
     for k in range(n):
-        if anchors.state[k] != ANCHORED:
-            continue
-        b = pulling_point(anchors, pose, k)
-        stretch = sub(b, anchor_position(anchors, body, body.positions, k))
-        if dot(stretch, forward) < 0.0:
+        b, holds = pulling_point(anchors, pose, k), anchors.state[k] == ANCHORED
+        if holds:
+            stretch = sub(b, anchor_position(anchors, body, body.positions, k))
+            holds = dot(stretch, forward) >= 0.0
+        if not holds:
+            if anchors.cut[k] > 0.0:  # it cut, and left the tissue since
+                none = Vec3(0.0, 0.0, 0.0)
+                _add_contact(report, b, forward, 0.0, none, anchors.cut[k])
             continue
         surplus = surplus_stretch(anchors, k, stretch, pose, blade.toughness)
         force = scale(anchors.stiffness[k], sub(stretch, surplus))
