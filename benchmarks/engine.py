@@ -19,6 +19,7 @@ from tissue.blade.edge import NOWHERE
 from tissue.contact.response.forces import add_contact_forces, end_contact_substep
 from tissue.contact.self_contact import SelfContact
 from tissue.core.jit import kernel
+from tissue.elasticity.viscous_stress import no_viscosity
 from tissue.forces.step_context import Increment
 from tissue.forces.terms import accelerations
 from tissue.integrators.global_stepper import GlobalStepper
@@ -134,7 +135,7 @@ class EngineLoops:
     Args:
         mesh: The block.
         law: Name of the law of elasticity.
-        is_damped: Whether there are dampers along the edges.
+        is_damped: Whether the tissue is viscous.
         is_averaged: Whether dilatation is averaged over nodes, as the engine does, or taken in
             each tetrahedron, as other engines do.
         precision: Of the forces of tetrahedra, `double` or `single`.
@@ -164,13 +165,14 @@ class EngineLoops:
         if not is_averaged:
             elasticity = self._tissue._model.elasticity
             plain = neo_hookean(material.mu, material.lam, averaged=False)
-            arrays = elasticity.arrays
-            elasticity.arrays = arrays.replaced(solid=arrays.solid.replaced(law=plain))
+            solid = elasticity.arrays.solid.replaced(law=plain)
+            viscosity = no_viscosity(solid, is_viscous=is_damped and law != "springs")
+            elasticity.arrays = elasticity.arrays.replaced(solid=solid, viscosity=viscosity)
 
     def forces(self, n: int) -> None:
         """Evaluate the forces on all nodes, and the accelerations that follow."""
         system = self._tissue._model
-        # With the dampers among the forces; the engine's own steps let them act in between.
+        # With viscosity among the forces; the engine's own steps let it act in between.
         damped = system.context.replaced(surroundings=system.surroundings)
         for _ in range(n):
             accelerations(damped, system.stages.a1)

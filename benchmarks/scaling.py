@@ -82,19 +82,19 @@ SHARE_OF_MEMORY = 0.6
 """Share of the free memory that all bodies together may take: other programs need some too."""
 
 _WHOLE_STEP = "whole step, damped"
-"""Name of a Runge-Kutta-Nystroem step of three evaluations and stages, with dampers."""
+"""Name of a Runge-Kutta-Nystroem step of three evaluations and stages, with viscosity."""
 
 _ABOUT = (
-    "A whole step evaluates forces three times and dampers four times. Single, double: precision "
+    "A whole step evaluates forces three times and viscosity once. Single, double: precision "
     "of the forces. Blocks of jittered cells of 10 mm, held on four sides; one thread; sizes take "
     "turns. CPU: CPU time. A step of the whole body costs the same per tetrahedron until the body "
     "outgrows a cache."
 )
 _ABOUT_KERNELS = (
     "ns/tet: ns per tetrahedron. Single, double: precision of the forces, as `run` takes it under "
-    "the law. Evaluation and stage: a third of a Runge-Kutta-Nystroem step, without dampers. "
-    "Damped: with dampers along the edges; a whole step evaluates forces three times and dampers "
-    "four times. Evaluation alone: forces and accelerations in one call, without the stage that "
+    "the law. Evaluation and stage: a third of a Runge-Kutta-Nystroem step, without viscosity. "
+    "Damped: with viscosity; a whole step evaluates forces three times and viscosity "
+    "once. Evaluation alone: forces and accelerations in one call, without the stage that "
     "would use them at once. The time step is all that is done in 1 ms without a blade: next to "
     "nothing once the block rests. Blocks of jittered cells of 10 mm, held on four sides; one "
     "thread. CPU: CPU time."

@@ -86,8 +86,8 @@ class Material:
     and turns freely: drag acts on its motion less the rigid part, see
     `tissue.forces.rigid_motion`."""
     retardation_time: float = 5e-5
-    """Viscosity per stiffness of dampers along the edges [s] (Kelvin-Voigt). As a continuum:
-    viscosity in shear over the shear modulus `mu`, under either law."""
+    """Viscosity over stiffness at small strain [s] (Kelvin-Voigt): of tetrahedra in shear and in
+    volume, of springs along the edges, where the volume term has none."""
     friction: float = 0.3
     """Coulomb's coefficient of friction where cut faces, pieces and the floor touch. Fresh muscle
     on bone was measured at 0.29 to 0.36 (Shacham, Castel and Gefen 2010); a wet serous skin slips
@@ -286,10 +286,13 @@ class Material:
     def _shear_per_tension(self) -> float:
         """Retardation time in shear over that of a bar that is pulled or bent.
 
-        Dampers in all directions are a body with both of Lame's constants mu per second of
-        retardation time. In a bar that narrows by nu times as much as it is stretched they have
-        viscosity (3 - 4 nu + 8 nu^2) mu per second, and its Young's modulus is 2 (1 + nu) mu.
+        Of tetrahedra both are the same. Dampers along edges in all directions are a body with both
+        of Lame's constants mu per second of retardation time. In a bar that narrows by nu times as
+        much as it is stretched they have viscosity (3 - 4 nu + 8 nu^2) mu per second, and its
+        Young's modulus is 2 (1 + nu) mu.
         """
+        if not self.law.has_springs:
+            return 1.0
         nu = self.poisson_ratio
         return 2.0 * (1.0 + nu) / (3.0 - 4.0 * nu + 8.0 * nu * nu)
 

@@ -160,3 +160,54 @@ def forces(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> 
         np.add.at(out, mesh.tetrahedra[:, k + 1], pulls[:, :, k])
         np.add.at(out, mesh.tetrahedra[:, 0], -pulls[:, :, k])
     return out
+
+
+def viscous_moduli(law: EnergyDensity) -> tuple[FloatArray, FloatArray]:
+    """Return mu and lam of tetrahedra by themselves, and of averages around nodes [Pa].
+
+    Those of the stiffness at rest, but that no bulk modulus of tetrahedra is negative.
+    """
+    mu = law.shear_modulus * np.array([1.0 - law.shear_of_nodes, law.shear_of_nodes])
+    lam = np.array([law.lam_of_tetrahedra, law.lam_of_nodes])
+    lam -= law.excess * np.array([1.0 - law.shear_of_nodes, law.shear_of_nodes])
+    lacking = max(-lam[0] - 2.0 / 3.0 * mu[0], 0.0) if law.lam_of_nodes else 0.0
+    return mu, lam + np.array([lacking, -lacking])
+
+
+def largest_growth(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
+    """Return by how much the square of a face of each tetrahedron has grown at most, or 1."""
+
+    def squares(x):
+        corners = x[mesh.tetrahedra]
+        faces = [np.delete(corners, k, axis=1) for k in range(4)]
+        normals = [np.cross(f[:, 1] - f[:, 0], f[:, 2] - f[:, 0]) for f in faces]
+        return np.array([(n**2).sum(axis=1) for n in normals])
+
+    return np.maximum((squares(positions) / squares(mesh.positions)).max(axis=0), 1.0)
+
+
+def viscous_forces(
+    mesh: TetrahedralMesh, positions: FloatArray, velocities: FloatArray, law: EnergyDensity
+) -> FloatArray:
+    """Return the viscous force on each node per retardation time [N/s].
+
+    Minus V T cof F grad N with T = 2 mu J d + lam tr(J d) 1, J d = sym(F' (cof F)^T).
+    """
+    v, inverse = volumes(mesh), np.linalg.inv(edges(*mesh))
+    share = 2.0 / (1.0 + largest_growth(mesh, positions))
+    c = share[:, None, None] * cofactors(gradients(mesh, positions))
+    rate = edges(velocities, mesh.tetrahedra) @ inverse @ c.transpose(0, 2, 1)
+    rate = 0.5 * (rate + rate.transpose(0, 2, 1))
+    sums = [around_nodes(mesh, v * rate[:, i, j]) for i in range(3) for j in range(3)]
+    of_nodes = (np.array(sums) / around_nodes(mesh, v)).T.reshape(-1, 3, 3)
+    stress = np.zeros_like(rate)
+    for r, mu, lam in zip(
+        (rate, of_nodes[mesh.tetrahedra].mean(axis=1)), *viscous_moduli(law), strict=True
+    ):
+        stress += 2.0 * mu * r + lam * np.trace(r, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    pulls = -v[:, None, None] * stress @ c @ inverse.transpose(0, 2, 1)
+    out = np.zeros_like(positions)
+    for k in range(3):
+        np.add.at(out, mesh.tetrahedra[:, k + 1], pulls[:, :, k])
+        np.add.at(out, mesh.tetrahedra[:, 0], -pulls[:, :, k])
+    return out

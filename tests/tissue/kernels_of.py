@@ -26,6 +26,7 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
+from tissue.elasticity.viscous_stress import no_viscosity
 from tissue.forces.attachments import no_attachments
 from tissue.forces.step_context import Damping, Stages, StepContext, new_stages, supports_at_rest
 from tissue.forces.terms import accelerations
@@ -110,6 +111,7 @@ def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
     return Elastic(
         springs=springs,
         solid=solid,
+        viscosity=no_viscosity(solid, is_viscous=False),
         collapsing=no_collapse(0, 0, 0.0),
         has_springs=1,
         has_tetrahedra=0,
@@ -208,7 +210,7 @@ class Network(NamedTuple):
         context = context.replaced(surroundings=undamped, damping=damping)
         take_steps(context, method, NOWHERE, n * h, 0.0, 1.0, n)
         if not is_running:
-            damp(context, 0.0)
+            damp(context, 0.0, False)
         return damping
 
     def advance(self, h: float, n: int = 1) -> None:

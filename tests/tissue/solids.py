@@ -23,6 +23,7 @@ from tissue.elasticity.finite_elements import (
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import deform_solid, solid_force, solid_forces
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks, relax_nodes
+from tissue.elasticity.viscous_stress import Viscosity, no_viscosity, viscous_corner_forces
 from tissue.laws.energy_density import (
     EnergyDensity,
     averaged_shear,
@@ -79,6 +80,14 @@ class SolidBody(NamedTuple):
     def energy(self, positions: FloatArray) -> float:
         """Return the elastic energy of the nodes at `positions`, less that at rest [J]."""
         return solid_energy(self.solid, self.body, self.placed(positions))
+
+    def viscous_forces(self, positions: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Return the viscous forces on the nodes per retardation time [N/s]."""
+        out = np.zeros((self.body.n_nodes, 3))
+        self.body.velocities[: len(velocities)] = velocities
+        viscosity = no_viscosity(self.solid, is_viscous=True)
+        evaluate_viscous(viscosity, self.solid, self.body, self.placed(positions), out)
+        return out
 
     def placed(self, positions: FloatArray) -> FloatArray:
         """Copy the positions into the body; return its array, which has spare capacity."""
@@ -162,6 +171,16 @@ def highest_frequency(solid: SolidBody, positions: FloatArray | None = None) -> 
 def evaluate(solid: Solid, body: Body, positions: FloatArray, out: FloatArray) -> None:
     """Write the forces on all nodes to `out`."""
     solid_forces(solid, body, positions)
+    for i in range(body.n_nodes):
+        store_point(out, i, solid_force(solid, i))
+
+
+@kernel
+def evaluate_viscous(
+    viscosity: Viscosity, solid: Solid, body: Body, positions: FloatArray, out: FloatArray
+) -> None:
+    """Write the viscous forces on all nodes to `out`."""
+    viscous_corner_forces(viscosity, solid, body, positions, body.velocities)
     for i in range(body.n_nodes):
         store_point(out, i, solid_force(solid, i))
 

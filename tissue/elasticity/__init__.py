@@ -8,6 +8,7 @@ In the order in which they are best read:
     finite_elements         tetrahedra as elements: rest shapes, and the star of each node
     neo_hookean             forces of tetrahedra; what laws differ in is in `tissue.laws.kernels`
     collapse                what keeps tetrahedra from turning inside out where springs alone act
+    viscous_stress          how tetrahedra resist their rate of deformation
     relaxed_stress          the stress that has relaxed, and its part in the forces
     viscoelasticity         how it relaxes
     energy                  energies of the body, and the power of damping

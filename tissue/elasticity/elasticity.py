@@ -25,6 +25,7 @@ from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, add_momentum, no_mass_scaling
 from tissue.elasticity.relaxed_stress import inherit_at_nodes, inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
+from tissue.elasticity.viscous_stress import grown_viscosity, no_viscosity
 from tissue.laws.energy_density import averaged_shear, volume_term
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
@@ -79,16 +80,15 @@ class Elasticity:
             law = averaged_shear(law)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self._may_collapse = law is None and resists_collapse
+        law_or_none = law or volume_term(0.0)
+        slots = room_for_stars(*room)
+        solid = no_solid(law_or_none, *room, slots, prony=material.prony, is_single=is_single)
+        is_viscous = material.retardation_time > 0.0 and not material.law.has_springs
         self.arrays = Elastic.new(
             {"nodes": n_nodes},
             springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
-            solid=no_solid(
-                law or volume_term(0.0),
-                *room,
-                room_for_stars(*room),
-                prony=material.prony,
-                is_single=is_single,
-            ),
+            solid=solid,
+            viscosity=no_viscosity(solid, is_viscous=is_viscous),
             collapsing=(
                 no_collapse(n_nodes, n_tetrahedra, material.young_modulus)
                 if self._may_collapse
@@ -162,17 +162,20 @@ class Elasticity:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
-        arrays, solid = self.arrays, self.arrays.solid
+        arrays, solid, viscosity = self.arrays, self.arrays.solid, self.arrays.viscosity
         if self._has_solid:
             pool = max(len(solid.corner), room_for_stars(n_nodes, n_tetrahedra))
             solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
+            viscosity = grown_viscosity(viscosity, solid)
         collapsing = arrays.collapsing
         if self._may_collapse:
             collapsing = collapsing.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
         pool = len(arrays.springs.neighbour)
         springs = arrays.springs.grown({"nodes": n_nodes, "pool": pool})
         larger = arrays.grown({"nodes": n_nodes})
-        self.arrays = larger.replaced(collapsing=collapsing, springs=springs, solid=solid)
+        self.arrays = larger.replaced(
+            collapsing=collapsing, springs=springs, solid=solid, viscosity=viscosity
+        )
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
         n = len(nodes)

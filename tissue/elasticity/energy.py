@@ -36,7 +36,7 @@ from tissue.elasticity.averaged_shear import averages_of, shear_energy_of_nodes
 from tissue.elasticity.collapse import collapse_energy
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear, n_blocks
 from tissue.elasticity.gradients import known_gradient, shape_of
-from tissue.elasticity.internal_forces import Elastic, Surroundings, viscous_force
+from tissue.elasticity.internal_forces import Elastic, Surroundings, resist, viscous_force
 from tissue.elasticity.neo_hookean import deform_solid, dilated_around, own_dilatation
 from tissue.elasticity.relaxed_stress import (
     PRESSURE,
@@ -105,7 +105,7 @@ def dissipated_power(
 
     Args:
         body: Masses and fixed nodes.
-        elastic: The dampers.
+        elastic: What is viscous; scratch is written.
         surroundings: Drag and retardation time.
         positions: Positions of the nodes [m].
         velocities: Their velocities [m/s].
@@ -113,6 +113,8 @@ def dissipated_power(
     """
     time = surroundings.retardation_time
     power = 0.0
+    if time > 0.0:
+        resist(elastic, body, positions, velocities)
     for node in range(body.n_nodes):
         v = vec3(velocities, node)
         if not body.fixed[node]:

@@ -1,12 +1,13 @@
 """Elastic and viscous forces on a node.
 
 The law of the material decides whether springs along the edges, tetrahedra as elements of a solid,
-or both are elastic. Dampers lie along the edges under either law.
+or both are elastic. Viscosity is that of dampers along the edges where springs act, else that of
+tetrahedra (`tissue.elasticity.viscous_stress`).
 """
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import Point, point_of
+from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
@@ -20,6 +21,7 @@ from tissue.elasticity.springs import (
     elastic_and_damping_force,
     elastic_force,
 )
+from tissue.elasticity.viscous_stress import Viscosity, is_viscous, viscous_corner_forces
 from tissue.mesh.body import Body
 
 
@@ -27,9 +29,11 @@ class Elastic(Arrays, two_precisions=True):
     """All that forces inside the body are computed from."""
 
     springs: Springs
-    """Springs along the edges; the dampers have their stiffness."""
+    """Springs along the edges; dampers have their stiffness."""
     solid: Solid
     """Tetrahedra as elements; empty where springs alone are elastic."""
+    viscosity: Viscosity
+    """How they resist their rate of deformation; empty where springs act, or without viscosity."""
     collapsing: Collapsing
     """What keeps tetrahedra from turning inside out where springs alone are elastic."""
     has_springs: IntCell
@@ -41,8 +45,8 @@ class Elastic(Arrays, two_precisions=True):
     highest_of_tetrahedra: FloatCell
     """Bound on the square of the frequencies of tetrahedra alone so far [1/s2]."""
     highest_of_dampers: FloatCell
-    """Bound on the square of the frequencies of springs alone so far [1/s2]. The dampers have the
-    stiffness of springs under either law."""
+    """Bound on the square of the frequencies of springs alone so far [1/s2]: dampers along the
+    edges have their stiffness."""
     scaling: MassScaling
     """Which nodes get mass where tetrahedra carry the shear."""
     frequency_squared: FloatArray = sized("nodes")
@@ -67,7 +71,18 @@ class Surroundings(Arrays):
     drag: float
     """Rate at which free motion dies away [1/s]."""
     retardation_time: float
-    """Damping along each edge, per stiffness of the edge [s]."""
+    """Viscosity per stiffness at rest, of springs or of tetrahedra [s]."""
+
+
+@kernel
+def damped_frequency(elastic: Elastic) -> float:
+    """Return a bound on the rates of decay by viscosity, per retardation time [1/s2].
+
+    It is that on w^2 of what is viscous.
+    """
+    if is_viscous(elastic.viscosity):
+        return float(elastic.highest_of_tetrahedra)
+    return float(elastic.highest_of_dampers)
 
 
 @kernel
@@ -87,18 +102,20 @@ def internal_force(
 ) -> Point:
     """Return the elastic and viscous force on a node [N], after `deform` at the same positions.
 
+    Where tetrahedra are viscous, `keep_viscous_forces` was run before that, with the velocities.
+
     Args:
         elastic: Springs and elements.
         node: The node.
         positions: Positions of the nodes [m].
         velocities: Their velocities [m/s].
-        retardation_time: Viscosity per stiffness of the dampers [s].
+        retardation_time: Viscosity per stiffness [s].
     """
     springs = elastic.springs
     total = point_of(0.0, 0.0, 0.0)
     if not elastic.has_springs:
         if retardation_time > 0.0:
-            total = damping_force(springs, node, positions, velocities, retardation_time)
+            total = times(retardation_time, point(elastic.viscosity.force, node))
     elif retardation_time > 0.0:
         total = elastic_and_damping_force(springs, node, positions, velocities, retardation_time)
     else:
@@ -118,14 +135,33 @@ def viscous_force(
 ) -> Point:
     """Return the viscous part of the force on a node [N], which is linear in the velocities.
 
+    Where tetrahedra are viscous, after `resist` at the same positions and velocities.
+
     Args:
-        elastic: The dampers.
+        elastic: What is viscous.
         node: The node.
         positions: Positions of the nodes [m].
         velocities: Their velocities [m/s].
-        retardation_time: Viscosity per stiffness of the dampers [s].
+        retardation_time: Viscosity per stiffness [s].
     """
+    if is_viscous(elastic.viscosity):
+        return times(retardation_time, solid_force(elastic.solid, node))
     return damping_force(elastic.springs, node, positions, velocities, retardation_time)
+
+
+@kernel
+def resist(elastic: Elastic, body: Body, positions: FloatArray, velocities: FloatArray) -> None:
+    """Evaluate how tetrahedra resist `velocities` [m/s] at `positions` [m], for `viscous_force`."""
+    if is_viscous(elastic.viscosity):
+        viscous_corner_forces(elastic.viscosity, elastic.solid, body, positions, velocities)
+
+
+@kernel
+def keep_viscous_forces(elastic: Elastic, body: Body) -> None:
+    """Keep the viscous forces of tetrahedra for `internal_force`, after `resist`."""
+    if is_viscous(elastic.viscosity):
+        for i in range(body.n_nodes):
+            store_point(elastic.viscosity.force, i, solid_force(elastic.solid, i))
 
 
 @kernel

@@ -251,7 +251,7 @@ def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return the elastic pressures p of the tetrahedra of a block [Pa], of volumes `v` [m3]."""
     law, p = solid.law, splat(0.0, v)
     if law.lam_of_nodes != 0.0:
-        p = splat(0.25, v) * _pressure_of_nodes(solid, block)
+        p = splat(0.25, v) * sum_of_corners(solid, solid.pressure, block)
     return with_own_pressure(solid, block, v, p)
 
 
@@ -293,9 +293,9 @@ def _product(px: Vec3, py: Vec3, pz: Vec3, g: Vec3) -> Vec3:
 
 
 @inlined
-def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
-    """Return the sum of the pressures at the four nodes [Pa]."""
-    width, rows, nodes = width_of(solid.shape), solid.pressure, solid.nodes
+def sum_of_corners(solid: Solid, rows: FloatArray, block: int) -> Lanes:
+    """Return the sum of what `rows` have for the four nodes of the tetrahedra of a block."""
+    width, nodes = width_of(solid.shape), solid.nodes
     first = 4 * width * block
     ends = values_of_rows(rows, nodes, first) + values_of_rows(rows, nodes, first + width)
     others = values_of_rows(rows, nodes, first + 2 * width)
@@ -305,10 +305,16 @@ def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
 @inlined
 def dilated_around(solid: Solid, node: int) -> float:
     """Return a quarter of V (J - 1) of the tetrahedra around a node [m3]."""
+    return 0.25 * sum_around(solid, solid.dilated, node)
+
+
+@inlined
+def sum_around(solid: Solid, values: FloatArray, node: int) -> float:
+    """Return the sum of `values` of the tetrahedra around a node, which are behind a block."""
     total = 0.0
     slot = solid.first[node]
     end = slot + solid.count[node]
     while slot < end:
-        total += sum_of_eight(solid.dilated, solid.around, slot)
+        total += sum_of_eight(values, solid.around, slot)
         slot += WIDTH
-    return 0.25 * total
+    return total

@@ -14,7 +14,7 @@ from tissue.forces.step_context import StepContext
 def is_solid(context: StepContext) -> bool:
     """Return whether tetrahedra alone act inside the body in the stages of a step.
 
-    The loops over nodes are then compiled without what springs and dampers take, and write
+    The loops over nodes are then compiled without what springs and viscosity take, and write
     displacements as well as positions.
     """
     elastic, time = context.elastic, context.surroundings.retardation_time

@@ -1,6 +1,6 @@
 """The rigid motion of loose pieces, which drag does not act on: a loose piece falls freely.
 
-Drag damps the slow modes of tissue, which dampers along edges barely reach. It stands for what
+Drag damps the slow modes of tissue, which viscosity barely reaches. It stands for what
 happens within tissue, and so acts on the motion of a piece less its rigid part, that with the same
 momentum and the same angular momentum as the piece has. What is left has neither, so that drag
 changes neither. A piece that is held somewhere has no rigid motion.

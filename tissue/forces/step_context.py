@@ -79,7 +79,7 @@ class Damping(Arrays):
     rate_uncut: float
     """Highest rate at which damping stops a motion of the body before it is cut [1/s]."""
     retardation_time: float
-    """Damping along each edge, per stiffness of the edge [s]; 0 where it acts in every stage."""
+    """Viscosity per stiffness at rest [s]; 0 where it acts in every stage."""
     drag: float
     """Rate at which free motion dies away [1/s]; 0 where it acts in every stage."""
 

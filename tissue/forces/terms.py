@@ -30,7 +30,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point_of, store_point
 from tissue.elasticity.collapse import add_collapse_forces, clear_collapse_forces, find_collapsing
-from tissue.elasticity.internal_forces import deform
+from tissue.elasticity.internal_forces import deform, keep_viscous_forces, resist
 from tissue.forces.acceleration import acceleration
 from tissue.forces.attachments import (
     add_attachment_forces,
@@ -211,7 +211,7 @@ def press_at_rest(context: StepContext, seconds: float) -> None:
 def accelerations(context: StepContext, out: FloatArray) -> None:
     """Write the acceleration of every node as it is and moves now to `out` [m/s2]."""
     body = context.body
-    _add_terms_at_rest(context)
+    _add_terms_at_rest(context, context.surroundings.retardation_time)
     for i in range(body.n_nodes):
         store_point(out, i, acceleration(context, i, body.positions, body.velocities))
     clear_terms(context)
@@ -222,7 +222,7 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
     """Write the force that holds each fixed node now to `out` [N], and zero for other nodes."""
     body = context.body
     time = context.surroundings.retardation_time + context.damping.retardation_time
-    _add_terms_at_rest(context)
+    _add_terms_at_rest(context, time)
     for i in range(body.n_nodes):
         force = point_of(0.0, 0.0, 0.0)
         if body.fixed[i]:
@@ -232,10 +232,18 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
 
 
 @kernel
-def _add_terms_at_rest(context: StepContext) -> None:
-    """Deform the body where it is, and add the forces on nodes there; nothing is counted."""
+def _add_terms_at_rest(context: StepContext, retardation_time: float) -> None:
+    """Deform the body where it is, and add the forces on nodes there; nothing is counted.
+
+    Args:
+        context: Written.
+        retardation_time: Of the viscosity that counts [s].
+    """
     body, external = context.body, context.stages.external
     x, v = body.positions, body.velocities
+    if retardation_time > 0.0:
+        resist(context.elastic, body, x, v)
+        keep_viscous_forces(context.elastic, body)
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
     add_collapse_forces(context.elastic.collapsing, body, x, external)

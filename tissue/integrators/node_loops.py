@@ -5,6 +5,7 @@ wrote; sums are gathered. So the result does not depend on who runs which part o
 (`tissue.core.thread_team`).
 """
 
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.simd_points import store_row
@@ -21,27 +22,39 @@ from tissue.core.thread_team import (
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.gradients import displacements
 from tissue.elasticity.internal_forces import viscous_force
-from tissue.elasticity.neo_hookean import average_volumes, corner_forces, displacement_gradients
+from tissue.elasticity.neo_hookean import (
+    average_volumes,
+    corner_forces,
+    displacement_gradients,
+    has_averages,
+)
 from tissue.elasticity.viscoelasticity import relax_blocks, relax_nodes
+from tissue.elasticity.viscous_stress import (
+    average_rates,
+    rates_of_deformation,
+    viscous_forces,
+    write_velocities,
+)
 from tissue.forces.acceleration import acceleration, acceleration_of, is_solid
 from tissue.forces.step_context import Stages, StepContext
 from tissue.mesh.body import Body
 
-GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
+GRADIENTS, CORNER_FORCES, STRESS_RELAXATION, RATES, VISCOUS_FORCES = 0, 1, 2, 3, 4
 """Loops over blocks of tetrahedra."""
-DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, AVERAGES, NODE_RELAXATION = 3, 4, 5, 6, 7
+DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST = 5, 6, 7
+AVERAGES, NODE_RELAXATION, AVERAGE_RATES = 8, 9, 10
 """Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
 DISPLACED = -1
 """Stands for a loop of displacements where the loop before has written them."""
 DEFORMED = -2
 """Stands for it where gradients are known (`Solid.are_gradients_known`), and averaged shear."""
-FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 8, 9, 10, 11
+FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 11, 12, 13, 14
 """Loops over nodes of the Runge-Kutta method on two levels."""
-NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 12, 13, 14
+NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 15, 16, 17
 """Loops over nodes of the method of three stages."""
-DRIFTING, KICKING = 15, 16
+DRIFTING, KICKING = 18, 19
 """Loops over nodes of position Verlet."""
-DAMPING_CHANGES = 17
+DAMPING_CHANGES = 20
 """The loop over nodes of damping between steps."""
 
 BLOCKS_OF_A_CHUNK = 32
@@ -61,7 +74,7 @@ def run_loop(context: StepContext, loop: int, seconds: float) -> None:
         loop: Which loop.
         seconds: The step that it is for [s]; some loops need none.
     """
-    is_of_blocks = loop <= STRESS_RELAXATION
+    is_of_blocks = loop <= VISCOUS_FORCES
     body, team = context.body, context.team
     n = n_blocks(context.elastic.solid, body.n_tetrahedra) if is_of_blocks else body.n_nodes
     if team.is_shared == 0:
@@ -76,6 +89,20 @@ def run_loop(context: StepContext, loop: int, seconds: float) -> None:
         of_others -= 1
         chunk = claim_first(team)
     wait_for_others(team, of_others)
+
+
+@kernel
+def resist_shared(context: StepContext, velocities: FloatArray) -> None:
+    """Evaluate how tetrahedra resist `velocities` [m/s], with threads, for `viscous_force`.
+
+    After `displacements`, or the gradients where they are known; see `internal_forces.resist`.
+    """
+    solid = context.elastic.solid
+    write_velocities(context.elastic.viscosity, context.body, velocities)
+    run_loop(context, RATES, 0.0)
+    if has_averages(solid):
+        run_loop(context, AVERAGE_RATES, 0.0)
+    run_loop(context, VISCOUS_FORCES, 0.0)
 
 
 @kernel
@@ -132,18 +159,25 @@ def _run_part(context: StepContext, loop: int, seconds: float, begin: int, end: 
 
 @kernel
 def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
-    """Run a part of a loop of `deform_shared`, or of relaxation."""
-    solid, body, stages = context.elastic.solid, context.body, context.stages
+    """Run a part of a loop of forces inside the body, or of relaxation."""
+    solid, viscosity = context.elastic.solid, context.elastic.viscosity
+    body, stages = context.body, context.stages
     if loop == GRADIENTS:
         displacement_gradients(solid, begin, end)
     elif loop == CORNER_FORCES:
         corner_forces(solid, begin, end)
     elif loop == STRESS_RELAXATION:
         relax_blocks(solid, begin, end)
+    elif loop == RATES:
+        rates_of_deformation(viscosity, solid, begin, end)
+    elif loop == VISCOUS_FORCES:
+        viscous_forces(viscosity, solid, begin, end)
     elif loop == AVERAGES:
         average_volumes(solid, begin, end)
     elif loop == NODE_RELAXATION:
         relax_nodes(solid, begin, end)
+    elif loop == AVERAGE_RATES:
+        average_rates(viscosity, solid, begin, end)
     else:
         positions = body.positions
         if loop == DISPLACEMENTS_2:
@@ -174,14 +208,14 @@ def first_stage(context: StepContext, h: float, begin: int, end: int) -> None:
 
 @kernel
 def second_stage(context: StepContext, h: float, begin: int, end: int) -> None:
-    """Find a2, and how much the third stage's velocities differ; without dampers a3 as well."""
+    """Find a2, and how much the third stage's velocities differ; without viscosity a3 as well."""
     body, stages, surroundings = context.body, context.stages, context.surroundings
     x2, v2 = stages.positions, stages.velocities
-    has_dampers = surroundings.retardation_time > 0.0
+    is_viscous = surroundings.retardation_time > 0.0
     for i in range(begin, end):
         a2 = acceleration(context, i, x2, v2)
         change = times(0.5 * h, a2 - point(stages.a1, i))
-        if has_dampers:
+        if is_viscous:
             store_point(stages.a2, i, a2)
             store_point(stages.change, i, change)
         else:

@@ -18,6 +18,7 @@ every stage, for the full order; by default it acts between the steps
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
+from tissue.elasticity.viscous_stress import is_viscous
 from tissue.forces.rigid_motion import note_loose_positions, return_rigid_motion
 from tissue.forces.step_context import Instant, StepContext
 from tissue.integrators.damping import (
@@ -34,6 +35,7 @@ from tissue.integrators.node_loops import (
     FOURTH_STAGE,
     SECOND_STAGE,
     THIRD_STAGE,
+    resist_shared,
     run_loop,
 )
 
@@ -87,6 +89,8 @@ def runge_kutta_nystroem(
     evaluate_forces(context, edge, x2, v2, DISPLACEMENTS_2, middle)
     run_loop(context, SECOND_STAGE, h)
     if context.surroundings.retardation_time > 0.0:
+        if is_viscous(context.elastic.viscosity):
+            resist_shared(context, stages.change)
         run_loop(context, THIRD_STAGE, h)
     x4, v4 = stages.last_positions, stages.velocities
     last = Instant(end, share / 6.0, h / 6.0, dt)

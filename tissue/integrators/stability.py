@@ -7,7 +7,7 @@ import numpy as np
 
 from tissue.core.jit import kernel
 from tissue.core.limits import MOST_SUBSTEPS
-from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.elasticity.internal_forces import Elastic, Surroundings, damped_frequency
 from tissue.integrators.methods import METHODS, RUNGE_KUTTA, SAFETY
 from tissue.laws.kernels import stiffens
 
@@ -64,7 +64,7 @@ def surely_takes_few_steps(
         squared: Bound on w^2 of the body with all that holds and touches it [1/s2].
         dt: Length of the time step [s].
     """
-    rate = surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag
+    rate = surroundings.retardation_time * damped_frequency(elastic) + surroundings.drag
     return bool(dt * (math.sqrt(squared) + rate) <= _SURELY_FEW * MOST_SUBSTEPS)
 
 
@@ -78,7 +78,7 @@ def stable_step(
 
     Args:
         method: Number of the method (`tissue.integrators.methods`).
-        elastic: Its dampers, and whether its law stiffens.
+        elastic: What is viscous, and whether its law stiffens.
         frequency_squared: Bound on w^2 [1/s2].
         surroundings: Gravity and all damping.
     """
@@ -99,14 +99,15 @@ def _stage_damped_step(
 ) -> float:
     """Return a stable Runge-Kutta step [s] where damping acts in every stage.
 
-    Dampers along edges brake a mode by retardation_time times their own w^2, and not by that of
-    tetrahedra, which is several times as high where tissue barely changes its volume. What is
-    braked as much at a lower frequency is stable too, within `SAFETY`: over the damping ratios
-    from 0.5 on, braking times the largest step is 2.6 to 2.8 (`STABILITY_LIMIT`).
+    What is viscous brakes a mode by retardation_time times its own w^2. Others act besides it: the
+    volume term beside dampers along edges, and the blade, contact and attachments. What is braked
+    as much at a lower frequency is stable too, within `SAFETY`: over the damping ratios from 0.5
+    on, braking times the largest step is 2.6 to 2.8 (`STABILITY_LIMIT`).
     """
     retardation_time = surroundings.retardation_time
-    if frequency_squared > elastic.highest_of_dampers:
-        retardation_time *= elastic.highest_of_dampers / frequency_squared
+    damped = damped_frequency(elastic)
+    if frequency_squared > damped:
+        retardation_time *= damped / frequency_squared
     frequency = math.sqrt(frequency_squared)
     largest: float = largest_stable_step(frequency, retardation_time, surroundings.drag)
     return SAFETY * largest
@@ -155,4 +156,4 @@ def without_another_step(
 @kernel
 def damping_rate(elastic: Elastic, surroundings: Surroundings) -> float:
     """Return the highest rate [1/s] at which damping stops a motion."""
-    return surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag
+    return surroundings.retardation_time * damped_frequency(elastic) + surroundings.drag

@@ -38,6 +38,7 @@ SCRATCH = frozenset(
         *(f"Solid.{name}" for name in ("forces", "ring", "rest_ring", "ring_nodes")),
         *(f"Solid.{name}" for name in ("fast_blocks", "node_gradient", "node_stress")),
         "Solid.gradient_rows",
+        "Viscosity",
         "Collapsing.scratch",
         # Searches of one pass of a cut.
         *(f"CutScratch.{name}" for name in ("around", "around_too", "parents", "parent_links")),

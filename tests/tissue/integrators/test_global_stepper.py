@@ -83,7 +83,7 @@ def test_damping_acts_once_in_two_steps_unless_slivers_would_be_turned_round(fac
     tissue = Tissue(block((2, 2, 2)), DAMPED, solver=SolverSettings(relaxation="verlet"))
     elastic, damping = tissue._model.elasticity.arrays, tissue._model.damping
     seconds = 0.225 / damping.rate_uncut
-    elastic.highest_of_dampers *= factor
+    elastic.highest_of_tetrahedra *= factor
     assert tissue.step(None, seconds).n_substeps == 1
     assert damping.interval == interval
 
