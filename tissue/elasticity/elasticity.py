@@ -22,7 +22,12 @@ from tissue.elasticity.frequency.changes import (
 )
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, add_momentum, no_mass_scaling
+from tissue.elasticity.mass_scaling import (
+    LARGEST_ADDED_MASS,
+    add_momentum,
+    no_mass_scaling,
+    write_masses,
+)
 from tissue.elasticity.relaxed_stress import inherit_at_nodes, inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
 from tissue.elasticity.viscous_stress import grown_viscosity, no_viscosity
@@ -79,14 +84,18 @@ class Elasticity:
         if law is not None and averages_shear:
             law = averaged_shear(law)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
+        self._has_springs = material.law.has_springs
+        room_for_springs = (n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS)
+        if not self._has_springs:
+            room_for_springs = (0, 0)
         self._may_collapse = law is None and resists_collapse
         law_or_none = law or volume_term(0.0)
         slots = room_for_stars(*room)
         solid = no_solid(law_or_none, *room, slots, prony=material.prony, is_single=is_single)
-        is_viscous = material.retardation_time > 0.0 and not material.law.has_springs
+        is_viscous = material.retardation_time > 0.0 and not self._has_springs
         self.arrays = Elastic.new(
             {"nodes": n_nodes},
-            springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
+            springs=no_springs(*room_for_springs),
             solid=solid,
             viscosity=no_viscosity(solid, is_viscous=is_viscous),
             collapsing=(
@@ -94,7 +103,7 @@ class Elasticity:
                 if self._may_collapse
                 else no_collapse(0, 0, 0.0)
             ),
-            has_springs=int(material.law.has_springs),
+            has_springs=int(self._has_springs),
             has_tetrahedra=int(law is not None),
             scaling=no_mass_scaling(),
         )
@@ -170,8 +179,9 @@ class Elasticity:
         collapsing = arrays.collapsing
         if self._may_collapse:
             collapsing = collapsing.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
-        pool = len(arrays.springs.neighbour)
-        springs = arrays.springs.grown({"nodes": n_nodes, "pool": pool})
+        springs = arrays.springs
+        if self._has_springs:
+            springs = springs.grown({"nodes": n_nodes, "pool": len(springs.neighbour)})
         larger = arrays.grown({"nodes": n_nodes})
         self.arrays = larger.replaced(
             collapsing=collapsing, springs=springs, solid=solid, viscosity=viscosity
@@ -180,12 +190,15 @@ class Elasticity:
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
         n = len(nodes)
         _FORGET_ADDED_MASS.call(self.arrays.scaling, body, nodes, n)
-        self._write_springs(body, visits, nodes)
+        if self._has_springs:
+            self._write_springs(body, visits, nodes)
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
             if self._relaxes and averages_shear(self.arrays.solid):
                 inherit_at_nodes(self.arrays.solid, nodes, n)
+        if not self._has_springs:
+            write_masses(body, self.arrays.solid, nodes, n, self._density)
         self._update_frequencies.call(self.arrays, body, visits, nodes, n)
         collapsing, highest = self.arrays.collapsing, self.arrays.highest
         self._renew_collapsing.call(collapsing, body, tetrahedra, len(tetrahedra), highest)

@@ -29,7 +29,7 @@ class Elastic(Arrays, two_precisions=True):
     """All that forces inside the body are computed from."""
 
     springs: Springs
-    """Springs along the edges; dampers have their stiffness."""
+    """Springs along the edges, and dampers of their stiffness; empty without springs."""
     solid: Solid
     """Tetrahedra as elements; empty where springs alone are elastic."""
     viscosity: Viscosity

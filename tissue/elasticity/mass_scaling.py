@@ -18,8 +18,8 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, axpy, cross, vec3
-from tissue.elasticity.finite_elements import Solid
-from tissue.elasticity.springs import Springs
+from tissue.elasticity.finite_elements import Solid, tetrahedron_of_slot
+from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
 
 LARGEST_ADDED_MASS = 0.02
@@ -78,9 +78,28 @@ def no_mass_scaling() -> MassScaling:
 
 
 @kernel
+def write_masses(body: Body, solid: Solid, nodes: IntArray, n: int, density: float) -> None:
+    """Write the masses of the first `n` of `nodes`, whose rows are up to date.
+
+    Args:
+        body: Masses are written.
+        solid: The tetrahedra around them.
+        nodes: The nodes.
+        n: How many of them.
+        density: Density of the tissue [kg/m3].
+    """
+    for i in range(n):
+        node, mass = nodes[i], 0.0
+        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+            t = tetrahedron_of_slot(solid, slot)
+            mass += density * tetrahedron_volume(body.rest, body.tetrahedra, t) / 4.0
+        body.masses[node] = mass
+        body.added_masses[node] = 0.0
+
+
+@kernel
 def scale_masses(
     body: Body,
-    springs: Springs,
     solid: Solid,
     nodes: IntArray,
     n: int,
@@ -93,7 +112,6 @@ def scale_masses(
 
     Args:
         body: Masses are written.
-        springs: The stiffness per mass of the nodes is written.
         solid: The bounds of the nodes are up to date for their masses now, and are written.
         nodes: The nodes.
         n: How many of them.
@@ -119,7 +137,6 @@ def scale_masses(
         body.added_masses[node] = after - own
         solid.frequency_squared[node] = stiffness / after
         solid.shear_frequency_squared[node] *= before / after
-        springs.stiffness_per_mass[node] *= before / after
         of_contact[node] *= before / after
     return change
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support import bodies, naive, naive_runge_kutta, strokes
+from tests.support.materials import SPRINGS
 from tests.tissue.kernels_of import YOUNG_MODULUS, Network, dense_modes, network_of, oscillator
 from tissue import Tissue, block
 from tissue.integrators.methods import NYSTROEM, VERLET
@@ -226,7 +227,7 @@ def test_a_body_without_springs_may_take_any_step():
 
 
 def cut_body(mesh, stroke):
-    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
+    tissue = Tissue(mesh, SPRINGS, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
     strokes.make(tissue, stroke)
     return tissue
 

@@ -57,7 +57,7 @@ def update_frequencies(
         changed = solid.listed
         if scaling.allowed < math.inf:
             limit = scaling.allowed, elastic.of_contact
-            scaling.added += scale_masses(body, springs, solid, changed, n, *limit)
+            scaling.added += scale_masses(body, solid, changed, n, *limit)
             if scaling.added > scaling.most:
                 _raise_limit(elastic, body)
                 changed, n = solid.every, body.n_nodes
@@ -65,9 +65,10 @@ def update_frequencies(
         forget_tests(solid, changed, n)
         highest = largest_frequency(body, solid.frequency_squared, changed, n)
         elastic.highest_of_tetrahedra = max(elastic.highest_of_tetrahedra, highest)
-    bound_frequencies(body, springs, changed, n)
-    highest = largest_frequency(body, springs.frequency_squared, changed, n)
-    elastic.highest_of_dampers = max(elastic.highest_of_dampers, highest)
+    if elastic.has_springs == 1:
+        bound_frequencies(body, springs, changed, n)
+        highest = largest_frequency(body, springs.frequency_squared, changed, n)
+        elastic.highest_of_dampers = max(elastic.highest_of_dampers, highest)
     bound_both_frequencies(elastic, changed, n)
     if elastic.has_tetrahedra == 1:
         bound_tetrahedra(elastic, body, changed, n)
@@ -79,11 +80,11 @@ def update_frequencies(
 def _raise_limit(elastic: Elastic, body: Body) -> None:
     """Raise the limit of frequencies until the added mass is small."""
     solid, scaling = elastic.solid, elastic.scaling
-    springs, every, n = elastic.springs, solid.every, body.n_nodes
+    every, n = solid.every, body.n_nodes
     while scaling.added > scaling.most:
         scaling.allowed *= LIMIT_STEP**2
         limit = scaling.allowed, elastic.of_contact
-        scaling.added += scale_masses(body, springs, solid, every, n, *limit)
+        scaling.added += scale_masses(body, solid, every, n, *limit)
 
 
 @kernel
@@ -112,14 +113,13 @@ def return_mass(elastic: Elastic, body: Body, nodes: IntArray, n: int) -> None:
         nodes: The nodes.
         n: How many of them.
     """
-    scaling, springs, solid = elastic.scaling, elastic.springs, elastic.solid
+    scaling, solid = elastic.scaling, elastic.solid
     before = _energy_of_added_mass(body, nodes, n)
     add_momentum(body, nodes, n, -1.0, scaling.impulse)
     limit = scaling.allowed, elastic.of_contact
-    scaling.added += scale_masses(body, springs, solid, nodes, n, *limit)
+    scaling.added += scale_masses(body, solid, nodes, n, *limit)
     scaling.lost += before - _energy_of_added_mass(body, nodes, n)
     add_momentum(body, nodes, n, 1.0, scaling.impulse)
-    bound_frequencies(body, springs, nodes, n)
     bound_both_frequencies(elastic, nodes, n)
     bound_tetrahedra(elastic, body, nodes, n)
     forget_tests(solid, nodes, n)

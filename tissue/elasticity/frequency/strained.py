@@ -315,7 +315,6 @@ def limited_frequency(
     elastic.of_contact[node] *= share
     solid.frequency_squared[node] *= share
     solid.shear_frequency_squared[node] *= share
-    elastic.springs.stiffness_per_mass[node] *= share
     limited: float = bound * share
     return limited
 

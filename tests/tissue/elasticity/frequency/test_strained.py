@@ -16,6 +16,7 @@ from tissue.elasticity.frequency.strained import (
     strained_frequency,
 )
 from tissue.elasticity.springs import no_springs
+from tissue.elasticity.viscous_stress import no_viscosity
 from tissue.mesh.star import no_visits
 
 pytestmark = pytest.mark.kernel
@@ -36,6 +37,7 @@ def elastic_of(solid):
     """Return the elastic arrays of a solid without springs."""
     elastic = kernels_of.elastic_of(no_springs(len(solid.body.rest), 0)).replaced(
         solid=solid.solid,
+        viscosity=no_viscosity(solid.solid, is_viscous=False),
         has_springs=0,
         has_tetrahedra=1,
         frequency_squared=solid.solid.frequency_squared.copy(),
