@@ -82,7 +82,12 @@ def surface_values_of(body: Body, elastic: Elastic, quantity: SurfaceQuantity) -
     if quantity == "strain":
         largest_principal_strains(body, sums, values)
     elif quantity == "stress":
+        # What the last step left is for the bound before the next one.
+        left = elastic.solid.gradient, elastic.solid.stiffness_taken
+        kept = [array.copy() for array in left]
         von_mises_stresses(elastic, body, sums, values)
+        for array, values_before in zip(left, kept, strict=True):
+            array[:] = values_before
     else:
         raise ValueError(
             f"there is no quantity {quantity!r}. Known: {', '.join(get_args(SurfaceQuantity))}"
