@@ -14,6 +14,7 @@ from tissue.blade.material_frame import find_sheets, rest_offset
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, average_directions
+from tissue.cutting.end_depth import shift_ends, take_back_shifts
 from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.mesh.body import OUTER, Body, walk
 
@@ -62,6 +63,7 @@ def trace_path(
     find_sheets(anchors, body, blade.reach)
     _note_progress(anchors)
     _note_passage(anchors, path)
+    take_back_shifts(path)
     for k in range(n):
         store(path.t0, k, vec3(path.t1, k))
         path.member[k] = anchors.state[k] != FREE
@@ -78,6 +80,7 @@ def trace_path(
         if path.member[k]:
             _begin_or_go_on(blade, body, k, margin, path)
     average_directions(path, blade.reach)
+    shift_ends(path, body, blade.reach)
     for k in range(n):
         path.known[k] = path.member[k]
         if anchors.sheets.first[k] == k and anchors.sheets.has_left[k]:
@@ -181,9 +184,11 @@ def forget_path(path: Path) -> None:
     path.has_left = path.has_end_in = path.is_through = 0
     for end in range(2):
         store(path.direction, end, Vec3(0.0, 0.0, 0.0))
+        path.excess[end] = 0.0
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False
+        store(path.shift, k, Vec3(0.0, 0.0, 0.0))
 
 
 @kernel

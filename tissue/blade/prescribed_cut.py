@@ -9,6 +9,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, average_directions, path_travel, resampled
+from tissue.cutting.end_depth import shift_ends, take_back_shifts
 from tissue.cutting.incision import CutHooks, Incision
 from tissue.mesh.body import Body, walk
 from tissue.mesh.point_location import tetrahedron_at, tetrahedron_in_box
@@ -123,6 +124,7 @@ def prescribe_path(
     along = sub(vec3(points, n - 1), vec3(points, 0))
     normal = cross(forward, along)
     sideways = scale(1.0 / norm(normal), normal)
+    take_back_shifts(path)
     for k in range(n):
         store(path.sideways, k, sideways)
         start = vec3(path.t1, k)
@@ -134,6 +136,7 @@ def prescribe_path(
     average_directions(path, node_size)
     for k in range(n):
         path.seed[k] = _find_seed(path, body, grid, k)
+    shift_ends(path, body, node_size)
 
 
 @kernel

@@ -10,6 +10,7 @@ In the order in which they are best read:
     snapping               use a node that is there for a crossing, or insert one
     stellar_subdivision    split the tetrahedra around an edge or a face
     crack_front            the edges of the mesh along which the cut ends
+    end_depth              what a crack front is beyond the path of its end is made good
     bridging               tetrahedra that still bridge the cut behind the blade
     separation             cut the faces on the cut surface and double their nodes
     stellar_scheme         our scheme, made of the files above

@@ -41,6 +41,13 @@ class Path(Arrays):
     direction: FloatArray = sized(2, 3)
     """Direction in which the tip and the heel went last, averaged over a node size, shape (2, 3).
     It is shorter than 1 at first, and where the direction changes; 0 outside the tissue."""
+    shift: FloatArray = sized("samples", 3)
+    """By how much `t1` is shifted from where the edge was traced [m], shape (n, 3): the ends make
+    good what opened beyond their paths (`tissue.cutting.end_depth`)."""
+    shift_t0: FloatArray = sized(2, 3)
+    """By how much `t0` of the tip and of the heel are shifted [m], shape (2, 3)."""
+    excess: FloatArray = sized(2)
+    """Area by which the cut is beyond the paths of the tip and of the heel [m2], shape (2,)."""
     seed: IntArray = sized("samples", fill=-1)
     """Tetrahedron at or next to each sample, or -1; shape (n,)."""
     member: BoolArray = sized("samples")
@@ -119,7 +126,7 @@ def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
 
 
 @kernel
-def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
+def is_unswept(path: Path, p: Vec3, margin: float, beyond: float) -> bool:
     """Return whether a point of the body at rest is where the edge has not been.
 
     It is ahead of where the edge is at the end of the step, or beyond the path of tip or heel.
@@ -127,7 +134,8 @@ def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
     Args:
         path: Path of the edge.
         p: The point, on the cut surface or near it [m].
-        margin: Distance by which it is so at least [m].
+        margin: Distance ahead by which it is so at least [m].
+        beyond: Distance beyond the path of an end by which it is so at least [m].
     """
     k = nearest_on_edge(path, p).segment
     if k < 0:
@@ -141,8 +149,8 @@ def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
         first -= 1
     while stop < last and path.linked[stop]:
         stop += 1
-    return (first == 0 and _is_beyond_end(path, 0, 0, p, margin)) or (
-        stop == last and _is_beyond_end(path, 1, last, p, margin)
+    return (first == 0 and _is_beyond_end(path, 0, 0, p, beyond)) or (
+        stop == last and _is_beyond_end(path, 1, last, p, beyond)
     )
 
 

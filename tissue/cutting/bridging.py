@@ -84,7 +84,7 @@ def _resolve_edge(cut: Cut, a: int, b: int) -> None:
     height_b = _height(plane_at(cut.path, segment, pb), pb)
     if height_a * height_b < 0.0:
         t = height_a / (height_a - height_b)
-        if not is_unswept(cut.path, lerp(t, pa, pb), cut.limits.floor):
+        if not is_unswept(cut.path, lerp(t, pa, pb), cut.limits.floor, cut.limits.guard):
             insert_crossing(cut, a, b, segment, t)
         return
     side = 1 if height_a + height_b >= 0.0 else -1

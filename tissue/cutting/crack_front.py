@@ -6,11 +6,13 @@ mesh
 faces: it failed for 20 to 50 % of the orders of insertion, and with them for none of 35,580.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 from tissue.cutting.blade_path import Path
+from tissue.cutting.cut_surface import rank_front_node
+from tissue.cutting.end_depth import count_front
 from tissue.cutting.snapping import insert_in_face
 from tissue.cutting.workspace import Cut
 from tissue.geometry.aabb import Aabb, overlap, tetrahedron_box
@@ -26,6 +28,10 @@ PARAMETER_GAP = 1e-9
 
 OUTSIDE_TOLERANCE = 1e-6
 """Barycentric weight by which a line through an edge or a corner may miss a face by rounding."""
+
+
+ALONG_EDGE: Final = -1
+"""In place of an end: a front along the edge itself."""
 
 
 class Event(NamedTuple):
@@ -70,9 +76,10 @@ def extend_fronts(cut: Cut) -> None:
     for end in range(2):
         sample = 0 if end == 0 else last
         if path.member[sample]:
-            front[end] = _insert_front(cut, line_of_sample(path, sample), front[end])
+            front[end] = _insert_front(cut, line_of_sample(path, sample), front[end], end)
         else:
             front[end] = -1
+            path.excess[end] = 0.0
 
 
 @kernel
@@ -108,18 +115,25 @@ def bring_front_to_blade(cut: Cut) -> None:
             origin,
             sub(vec3(path.t1, k + 1), origin),
         )
-        node = _insert_front(cut, line, node)
+        node = _insert_front(cut, line, node, ALONG_EDGE)
         if cut.change.is_full != 0:
             return
     if node >= 0 and path.member[last] and front[1] >= 0:
-        _join(cut, node, front[1])
+        _join(cut, node, front[1], ALONG_EDGE)
 
 
 @kernel
-def _insert_front(cut: Cut, line: LineSegment, before: int) -> int:
+def _insert_front(cut: Cut, line: LineSegment, before: int, end: int) -> int:
     """Insert and join nodes where the line pierces faces, the first one with node `before`.
 
-    Returns the last node; -1 where the line has left the body, or never was in it.
+    Args:
+        cut: Read and written.
+        line: The line.
+        before: Last node of the front; -1 if none.
+        end: The end of the edge whose path it is, 0 or 1; or ALONG_EDGE.
+
+    Returns:
+        The last node; -1 where the line has left the body, or never was in it.
     """
     when = 0.0
     for _ in range(MOST_EVENTS):
@@ -131,7 +145,7 @@ def _insert_front(cut: Cut, line: LineSegment, before: int) -> int:
         if node < 0:
             return before
         if before >= 0 and not (event.outer and not event.leaving):
-            _join(cut, before, node)
+            _join(cut, before, node, end)
         before = -1 if event.outer and event.leaving else node
         if cut.change.is_full != 0:
             return before
@@ -212,14 +226,37 @@ def _line_plane_intersection(
 
 
 @kernel
-def _join(cut: Cut, start: int, stop: int) -> None:
-    """Insert nodes along the segment between two nodes until edges of the mesh join them."""
+def _join(cut: Cut, start: int, stop: int, end: int) -> None:
+    """Insert nodes along the segment between two nodes until edges of the mesh join them.
+
+    Args:
+        cut: Read and written.
+        start: First node.
+        stop: Last node.
+        end: The end of the edge whose front they join, 0 or 1; or ALONG_EDGE.
+    """
+    last = _join_nodes(cut, start, stop, end)
+    _count(cut, end, last, stop)
+
+
+@kernel
+def _count(cut: Cut, end: int, a: int, b: int) -> None:
+    """Note that the front of an end goes from node a to node b, and the area up to its path."""
+    if end != ALONG_EDGE:
+        rank_front_node(cut.surface, a, end)
+        rank_front_node(cut.surface, b, end)
+        count_front(cut.path, end, vec3(cut.body.rest, a), vec3(cut.body.rest, b))
+
+
+@kernel
+def _join_nodes(cut: Cut, start: int, stop: int, end: int) -> int:
+    """Insert the nodes of `_join`; return the last one before `stop`."""
     body = cut.body
     around = cut.scratch.around_too
     a = start
     for _ in range(MOST_EVENTS):
         if a == stop:
-            return
+            return a
         n = star(body, cut.visits, a, body.node_tetrahedron[a], around)
         goal = vec3(body.rest, stop)
         origin = vec3(body.rest, a)
@@ -230,7 +267,7 @@ def _join(cut: Cut, start: int, stop: int) -> None:
         for i in range(n):
             t = around[i]
             if local_index(body, t, stop) >= 0:
-                return
+                return a
             k = local_index(body, t, a)
             p = body.tetrahedra[t, (k + 1) % 4]
             q = body.tetrahedra[t, (k + 2) % 4]
@@ -247,10 +284,12 @@ def _join(cut: Cut, start: int, stop: int) -> None:
                 best, best_when, best_weights = smallest, when, w
                 b, c, d = p, q, r
         if best < -OUTSIDE_TOLERANCE or best_when >= 1.0:
-            return  # the segment leaves the body: the front continues from `stop`
+            return a  # the segment leaves the body: the front continues from `stop`
         node = insert_in_face(cut, b, c, d, best_weights)
         if node < 0:
-            return
+            return a
         if norm(sub(goal, vec3(body.rest, node))) >= norm(sub(goal, lerp(0.0, origin, goal))):
-            return  # snapping would lead away from the goal
+            return a  # snapping would lead away from the goal
+        _count(cut, end, a, node)
         a = node
+    return a

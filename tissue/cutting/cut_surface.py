@@ -24,6 +24,9 @@ class CutSurface(Arrays):
     side: IntArray = sized("nodes")
     """Side of the cut surface that a node was found on, +1 or -1, 0 if unknown; (node
     capacity,)."""
+    rank: IntArray = sized("nodes")
+    """Place of a node in the crack front of the tip, from 1, or of the heel, from -1 down; 0 for
+    others; (node capacity,)."""
     nodes: IntArray = sized("nodes")
     """The nodes on the cut surface, in the order in which they came, shape (node capacity,)."""
     n_nodes: IntCell
@@ -34,6 +37,8 @@ class CutSurface(Arrays):
     """Side of the cut surface that a tetrahedron is on, 0 if undecided; (tetrahedron capacity,)."""
     front: IntArray = sized(2, fill=-1)
     """Last node of the crack front at the tip and at the heel, or -1; shape (2,)."""
+    n_front: IntArray = sized(2)
+    """Number of nodes in the crack fronts of the tip and of the heel, shape (2,)."""
 
 
 def new_cut_surface(n_nodes: int, n_tetrahedra: int) -> CutSurface:
@@ -46,8 +51,9 @@ def begin_cut_surface(surface: CutSurface) -> None:
     """Forget the last incision and begin another."""
     surface.number += 1
     surface.n_nodes = 0
-    surface.front[0] = -1
-    surface.front[1] = -1
+    for end in range(2):
+        surface.front[end] = -1
+        surface.n_front[end] = 0
 
 
 @kernel
@@ -58,6 +64,24 @@ def touch(surface: CutSurface, node: int) -> None:
         surface.past_offset[node] = max(surface.past_offset[node], surface.offset[node])
         surface.offset[node] = -1.0
         surface.side[node] = 0
+        surface.rank[node] = 0
+
+
+@kernel
+def rank_of(surface: CutSurface, node: int) -> int:
+    """Return the place of `node` in a crack front of this incision, or 0; see `CutSurface.rank`."""
+    if surface.node_stamp[node] != surface.number:
+        return 0
+    rank: int = surface.rank[node]
+    return rank
+
+
+@kernel
+def rank_front_node(surface: CutSurface, node: int, end: int) -> None:
+    """Give `node`, which is on the cut surface, the next place in the front of an end."""
+    if surface.rank[node] == 0:
+        surface.n_front[end] += 1
+        surface.rank[node] = surface.n_front[end] if end == 0 else -surface.n_front[end]
 
 
 @kernel

@@ -6,7 +6,7 @@ doubled.
 """
 
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, dot, sub, vec3
+from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.cutting.blade_path import plane_near
 from tissue.cutting.cut_surface import (
     decide_side,
@@ -14,6 +14,7 @@ from tissue.cutting.cut_surface import (
     note_side,
     on_cut_surface,
     put_on_cut_surface,
+    rank_of,
     side_of,
 )
 from tissue.cutting.workspace import Cut
@@ -97,6 +98,8 @@ def _mark_faces_of(cut: Cut, t: int) -> None:
         other_side = tetrahedron_side(cut, other)
         if side * other_side >= 0:
             continue
+        if _is_beyond_front(cut, t, f):
+            continue
         if _n_links(body, t) == 1 or _n_links(body, other) == 1:
             continue  # a tetrahedron keeps its last link: alone it would be a fragment
         if change.n_faces == len(change.faces):
@@ -120,6 +123,32 @@ def _face_is_on(cut: Cut, t: int, f: int) -> bool:
         if k != f and not on_cut_surface(cut.surface, cut.body.tetrahedra[t, k]):
             return False
     return True
+
+
+@kernel
+def _is_beyond_front(cut: Cut, t: int, f: int) -> bool:
+    """Return whether a face on the cut surface is beyond a crack front that it has a side in.
+
+    Where a front bends towards the cut, the mesh may have a face in the bend.
+    """
+    body, surface, path = cut.body, cut.surface, cut.path
+    for i in range(1, 4):
+        a = body.tetrahedra[t, (f + i) % 4]
+        rank = rank_of(surface, a)
+        if rank == 0:
+            continue
+        step = 1 if rank > 0 else -1
+        for j in range(1, 4):
+            b = body.tetrahedra[t, (f + j) % 4]
+            if rank_of(surface, b) != rank + step:
+                continue
+            other = body.tetrahedra[t, (f + 6 - i - j) % 4]
+            along = sub(vec3(body.rest, b), vec3(body.rest, a))
+            aside = sub(vec3(body.rest, other), vec3(body.rest, a))
+            sample = 0 if rank > 0 else len(path.member) - 1
+            turn = dot(cross(along, aside), vec3(path.sideways, sample))
+            return turn * step < 0.0
+    return False
 
 
 @kernel
@@ -342,6 +371,8 @@ def _copy_node(cut: Cut, node: int) -> int:
     body.off_path[copy] = body.off_path[node]
     if on_cut_surface(surface, node):
         put_on_cut_surface(surface, copy, surface.offset[node])
+    rank = rank_of(surface, node)
     note_side(surface, copy, side_of(surface, node), True)
     surface.past_offset[copy] = surface.past_offset[node]
+    surface.rank[copy] = rank
     return copy

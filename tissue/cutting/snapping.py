@@ -6,9 +6,11 @@ on the order of crossings and no thin tetrahedron has its four nodes on the cut 
 
 import math
 
+import numpy as np
+
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
-from tissue.cutting.blade_path import LEAST_ALIGNMENT, nearest_on_edge, plane_at
+from tissue.core.vec3 import Vec3, axpy, cross, dot, lerp, norm, sub, vec3
+from tissue.cutting.blade_path import LEAST_ALIGNMENT, nearest_on_edge, plane_at, plane_near
 from tissue.cutting.cut_surface import note_side, on_cut_surface, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
@@ -208,31 +210,61 @@ def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     near_bc = w.x * twice_area / norm(sub(pc, pb)) / min(snap_b, snap_c)
     near_ca = w.y * twice_area / norm(sub(pa, pc)) / min(snap_c, snap_a)
     near_ab = w.z * twice_area / norm(sub(pb, pa)) / min(snap_a, snap_b)
-    nearest = min(near_bc, min(near_ca, near_ab))
-    if nearest < 1.0 or not face_split_is_good(cut, a, b, c, w):
-        if near_bc == nearest:
-            return _insert_in_side(cut, b, c, w.z / (w.y + w.z), snap_b, snap_c)
-        if near_ca == nearest:
-            return _insert_in_side(cut, c, a, w.x / (w.z + w.x), snap_c, snap_a)
-        return _insert_in_side(cut, a, b, w.y / (w.x + w.y), snap_a, snap_b)
-    node = split_face(cut, a, b, c, w)
-    if node >= 0:
-        flag(cut, node)
-    return node
+    if min(near_bc, min(near_ca, near_ab)) >= 1.0 and face_split_is_good(cut, a, b, c, w):
+        node = split_face(cut, a, b, c, w)
+        if node >= 0:
+            flag(cut, node)
+        return node
+    return _insert_at_rim(cut, a, b, c, w, p)
 
 
 @kernel
-def _insert_in_side(cut: Cut, a: int, b: int, t: float, snap_a: float, snap_b: float) -> int:
-    """Return a node on the cut surface at fraction `t` of edge ab."""
-    closer = a if t < 0.5 else b
+def _insert_at_rim(cut: Cut, a: int, b: int, c: int, w: Vec3, p: Vec3) -> int:
+    """Return a node on the cut surface at the rim of face abc, as near to `p` as may be.
+
+    Args:
+        cut: Read and written.
+        a: First corner.
+        b: Second corner.
+        c: Third corner.
+        w: Barycentric weights of `p`.
+        p: Where the node is wanted [m].
+    """
+    normal = plane_near(cut.path, p).normal
+    best, best_node, best_a, best_b, best_t = np.inf, a, a, b, 0.0
+    for i in range(3):
+        first = a if i == 0 else (b if i == 1 else c)
+        second = b if i == 0 else (c if i == 1 else a)
+        w_first = w.x if i == 0 else (w.y if i == 1 else w.z)
+        w_second = w.y if i == 0 else (w.z if i == 1 else w.x)
+        pf, ps = vec3(cut.body.rest, first), vec3(cut.body.rest, second)
+        cost = _distance(sub(pf, p), normal)
+        if cost < best:
+            best, best_node, best_a = cost, first, -1
+        if w_first + w_second == 0.0:
+            continue
+        t = w_second / (w_first + w_second)
+        cost = _distance(sub(lerp(t, pf, ps), p), normal)
+        if cost < best and _may_split(cut, first, second, t):
+            best, best_a, best_b, best_t = cost, first, second, t
+    if best_a >= 0:
+        best_node = split_edge(cut, best_a, best_b, best_t)
+    if best_node >= 0:
+        flag(cut, best_node)
+    return best_node
+
+
+@kernel
+def _may_split(cut: Cut, a: int, b: int, t: float) -> bool:
+    """Return whether edge ab may get a node at fraction `t`: no end of it is near, nor a sliver."""
     if on_cut_surface(cut.surface, a) and on_cut_surface(cut.surface, b):
-        return closer
+        return False
     length = norm(sub(vec3(cut.body.rest, a), vec3(cut.body.rest, b)))
-    near = min(t * length / snap_a, (1.0 - t) * length / snap_b)
-    if near < 1.0 or not edge_split_is_good(cut, a, b, t):
-        flag(cut, closer)
-        return closer
-    node = split_edge(cut, a, b, t)
-    if node >= 0:
-        flag(cut, node)
-    return node
+    near = min(t * length / snap_distance(cut, a), (1.0 - t) * length / snap_distance(cut, b))
+    return near >= 1.0 and edge_split_is_good(cut, a, b, t)
+
+
+@kernel
+def _distance(offset: Vec3, normal: Vec3) -> float:
+    """Return the length of an offset in which what is across the cut counts double."""
+    return norm(axpy(dot(offset, normal), normal, offset))

@@ -39,14 +39,14 @@ def path_to(y: float, rise: float = 0.0) -> Path:
     ],
 )
 def test_what_is_ahead_of_the_edge_or_beyond_its_ends_is_unswept(y, z, unswept):
-    assert is_unswept(path_to(2.0), Vec3(0.0, y, z), MARGIN) == unswept
+    assert is_unswept(path_to(2.0), Vec3(0.0, y, z), MARGIN, MARGIN) == unswept
 
 
 @pytest.mark.parametrize("y", [0.0, 1.0, 1.9])
 def test_the_way_of_a_tip_that_rises_was_lower_before(y):
     path = path_to(2.0, rise=0.5)
-    assert not is_unswept(path, Vec3(0.0, y, 0.5 * y), MARGIN)
-    assert is_unswept(path, Vec3(0.0, y, 0.5 * y - 1.5 * MARGIN), MARGIN)
+    assert not is_unswept(path, Vec3(0.0, y, 0.5 * y), MARGIN, MARGIN)
+    assert is_unswept(path, Vec3(0.0, y, 0.5 * y - 1.5 * MARGIN), MARGIN, MARGIN)
 
 
 def test_a_tip_outside_the_tissue_has_no_way():
@@ -60,10 +60,10 @@ def test_a_tip_outside_the_tissue_has_no_way():
 def test_a_tip_in_another_wall_says_nothing_of_this_one():
     path = path_to(2.0)
     path.linked[1] = False  # tip and sample 1 hold one wall, samples 2 and 3 another
-    assert not is_unswept(path, Vec3(0.0, 1.9, 1.8), MARGIN)
+    assert not is_unswept(path, Vec3(0.0, 1.9, 1.8), MARGIN, MARGIN)
     path.t1[:2] += [0.0, 0.0, 10.0]  # the way of the tip is above that of the other wall
-    assert not is_unswept(path, Vec3(0.0, 1.9, 1.8), MARGIN)
+    assert not is_unswept(path, Vec3(0.0, 1.9, 1.8), MARGIN, MARGIN)
 
 
 def test_of_an_edge_that_spans_nothing_nothing_is_unswept():
-    assert not is_unswept(new_path(N), Vec3(0.0, 1.0, 1.0), MARGIN)
+    assert not is_unswept(new_path(N), Vec3(0.0, 1.0, 1.0), MARGIN, MARGIN)
