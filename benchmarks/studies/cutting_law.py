@@ -4,7 +4,7 @@ Blocks of each tissue are cut headless, on meshes of other sizes than those of t
 their planes and between them, at angles to them, from the skin down to a tip or through, at several
 speeds and by a slanted and a sliding edge. In the middle of each cut, where it is steady, the
 benchmark compares the force with the law, and the area that the edge sweeps in the material with
-those that open and that are paid for.
+those that open and that are paid for, over 20 mm of it.
 """
 
 import itertools
@@ -34,6 +34,7 @@ from tissue import (
     lattice_block,
 )
 from tissue.blade.edge_anchors import ANCHORED
+from tissue.mesh.body import CUT
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,6 +45,9 @@ MESHES = (("block", 8e-3), ("lattice", 8e-3), ("lattice", 4.5e-3))
 """How cells are divided into tetrahedra, and their size [m]."""
 STEADY = (0.55, 0.85)
 """Part of the length of the block in which a cut counts as steady."""
+AREAS_OVER, PAST = 0.02, 0.016
+"""Length over which areas are compared, and distance from its end to the far side of the block [m]:
+the edge has to pass on by as much as it is ahead of its material, and by an element."""
 LAW_DT = 1e-3
 """Time step [s]."""
 APPROACH = 6e-3
@@ -107,7 +111,9 @@ class Measured(NamedTuple):
     swept: float
     """Area that the edge swept in the material, at rest."""
     opened: float
-    """Area of the faces that opened; elements open one by one."""
+    """Area of the faces that opened."""
+    flat: float
+    """Area of their projection on the plane of the cut: `opened` without what is rough."""
     paid: float
     """Area that the blade paid for."""
     released: float
@@ -119,7 +125,6 @@ class _Frame(NamedTuple):
 
     force: float
     paid: float
-    opened: float
     swept: float
     released: float
     work: float
@@ -141,15 +146,20 @@ def make_block(kind: str, cell: float) -> TetrahedralMesh:
     return (lattice_block if kind == "lattice" else block)(cells, SIZE)
 
 
+def length_of(cut: LawCut) -> float:
+    """Return how long a cut is in the block [m]."""
+    angle = math.radians(cut.angle)
+    return min(SIZE[1] / math.cos(angle), SIZE[0] / max(math.sin(angle), 1e-9))
+
+
 def poses(cut: LawCut) -> tuple[FloatArray, list[BladeSegment]]:
     """Return where the edge is along the block in each frame, 0 to 1, and its poses."""
     angle, slope = math.radians(cut.angle), math.radians(cut.slope)
     ahead = np.array([math.sin(angle), math.cos(angle), 0.0])
     along = -math.sin(slope) * ahead + np.array([0.0, 0.0, math.cos(slope)])
     forward = math.cos(slope) * ahead + np.array([0.0, 0.0, math.sin(slope)])
-    # Oblique cuts are as long as the block is wide, where that is less.
-    length = min(SIZE[1] / math.cos(angle), SIZE[0] / max(math.sin(angle), 1e-9))
-    begin, end = -0.5 * length - APPROACH, (STEADY[1] - 0.5) * length
+    length = length_of(cut)
+    begin, end = -0.5 * length - APPROACH, 0.5 * length
     travel = np.arange(begin, end, cut.speed * LAW_DT)
     slid = cut.slide * (travel - begin)
     low = -OUT_OF_BLOCK if cut.is_through else SIZE[2] - cut.depth
@@ -157,6 +167,29 @@ def poses(cut: LawCut) -> tuple[FloatArray, list[BladeSegment]]:
     middle = np.array([cut.x, 0.5 * SIZE[1], low])
     tips = [middle + s * ahead - d * along for s, d in zip(travel, slid, strict=True)]
     return travel / length + 0.5, [BladeSegment(tip, tip + high * along, forward) for tip in tips]
+
+
+class _Place(NamedTuple):
+    """Where a cut is in the block at rest."""
+
+    origin: FloatArray
+    """Where it crosses the middle of the block [m], shape (3,)."""
+    ahead: FloatArray
+    """Direction of the cut, shape (3,)."""
+    first: float
+    """Distance from the middle at which the areas begin to count [m]."""
+    is_through: bool
+    """Whether it cuts through."""
+
+    def along(self, points: FloatArray) -> FloatArray:
+        """Return how far points, shape (..., 3), are along the cut [m]."""
+        distances: FloatArray = (points - self.origin) @ self.ahead
+        return distances
+
+    def has(self, distances: FloatArray) -> BoolArray:
+        """Return which distances along the cut count [m]."""
+        counts: BoolArray = (distances > self.first) & (distances < self.first + AREAS_OVER)
+        return counts
 
 
 def measure_cut(
@@ -167,64 +200,111 @@ def measure_cut(
     solver = SolverSettings(audit=True, element=element)
     tissue = Tissue(mesh, material, fixed=fixed, gravity=(0.0, 0.0, 0.0), solver=solver)
     where, edges = poses(cut)
-    ahead = edges[1].tip - edges[0].tip
-    ahead = np.array([ahead[0], ahead[1], 0.0]) / np.linalg.norm(ahead[:2])
+    angle = math.radians(cut.angle)
+    place = _Place(
+        origin=np.array([cut.x, 0.5 * SIZE[1], 0.0]),
+        ahead=np.array([math.sin(angle), math.cos(angle), 0.0]),
+        first=0.5 * length_of(cut) - PAST - AREAS_OVER,
+        is_through=cut.is_through,
+    )
     frames: list[_Frame] = []
     before = _anchors(tissue)
     for pair in itertools.pairwise(edges):
         result = tissue.step(BladeSweep(*pair), LAW_DT)
         now = _anchors(tissue)
         assert result.energies is not None
+        swept, paid = _swept_and_paid(before, now, place)
         frames.append(
             _Frame(
-                force=-float(result.wrench.force @ ahead),
-                paid=float(result.contacts.cut_area.sum()),
-                opened=result.cut_area,
-                swept=_swept(before, now, cut.is_through),
+                force=-float(result.wrench.force @ place.ahead),
+                paid=paid,
+                swept=swept,
                 released=result.energies.released,
                 work=result.energies.work_of_blade,
             )
         )
         before = now
-    record = np.array(frames)[(where[1:] > STEADY[0]) & (where[1:] < STEADY[1])]
-    first, last = record[0], record[-1]
-    force, areas = record[:, 0], record[1:, [1, 3]].sum(axis=0)
-    geometric = (len(record) - 1) * cut.speed * LAW_DT * min(cut.depth, SIZE[2])
+    record = np.array(frames)
+    _, total_paid, total_swept, *_ = record.sum(axis=0)
+    record = record[(where[1:] > STEADY[0]) & (where[1:] < STEADY[1])]
+    first, last, force = record[0], record[-1], record[:, 0]
+    opened, flat = _opened(tissue, place)
+    geometric = AREAS_OVER * min(cut.depth, SIZE[2])
     law = law_of(material, cut)
     return Measured(
         force=float(force.mean() / law),
         ripple=float(force.std() / abs(force.mean())),
         lowest=float(force.min() / law),
-        swept=float(areas[1] / geometric),
-        opened=float((last[2] - first[2]) / geometric),
-        paid=float(areas[0] / geometric),
-        released=float((last[4] - first[4]) / (last[5] - first[5])),
+        swept=float(total_swept / geometric),
+        opened=opened / geometric,
+        flat=flat / geometric,
+        paid=float(total_paid / geometric),
+        released=float((last[3] - first[3]) / (last[4] - first[4])),
     )
 
 
-def _anchors(tissue: Tissue) -> tuple[FloatArray, BoolArray]:
-    """Return the material points that hold the edge [m], and which of them do."""
+def _anchors(tissue: Tissue) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """Return the material points that hold the edge [m], which of them do, and what each cut."""
     anchors = tissue._model.interaction.state.anchors
-    return anchors.rest.copy(), anchors.state == ANCHORED
+    return anchors.rest.copy(), anchors.state == ANCHORED, anchors.cut.copy()
 
 
-def _swept(
-    before: tuple[FloatArray, BoolArray], now: tuple[FloatArray, BoolArray], is_through: bool
-) -> float:
-    """Return the area between the material points then and now, and up to the skin [m2]."""
+def _swept_and_paid(
+    before: tuple[FloatArray, BoolArray, FloatArray],
+    now: tuple[FloatArray, BoolArray, FloatArray],
+    place: _Place,
+) -> tuple[float, float]:
+    """Return the area between the material points then and now, up to the skin, and that paid for.
+
+    Both in m2, of what counts.
+    """
     if len(before[0]) != len(now[0]):  # the edge was taken up in this frame
-        return 0.0
+        return 0.0, 0.0
     held = before[1] & now[1]
-    if not held.any():
-        return 0.0
     p, q = before[0], now[0]
+    at = place.along(0.5 * (p + q))
+    paid = float(now[2][place.has(at)].sum())
+    if not held.any():
+        return 0.0, paid
     quads = 0.5 * np.linalg.norm(np.cross(q[1:] - p[:-1], q[:-1] - p[1:]), axis=1)
-    area = float(quads[held[1:] & held[:-1]].sum())
+    counts = held[1:] & held[:-1] & place.has(0.5 * (at[1:] + at[:-1]))
+    area = float(quads[counts].sum())
     ends = np.flatnonzero(held)[[0, -1]]
-    moved = np.linalg.norm((q - p)[ends, :2], axis=1)
+    moved = (q - p)[ends] @ place.ahead * place.has(at[ends])
     height = 0.5 * (p + q)[ends, 2]
     area += float(moved[1] * max(SIZE[2] - height[1], 0.0))
-    return area + (float(moved[0] * max(height[0], 0.0)) if is_through else 0.0)
+    return area + (float(moved[0] * max(height[0], 0.0)) if place.is_through else 0.0), paid
+
+
+def _opened(tissue: Tissue, place: _Place) -> tuple[float, float]:
+    """Return the area of the faces that opened, and that of their projection on the plane [m2]."""
+    body = tissue._body
+    tetrahedra = body.tetrahedra[: body.n_tetrahedra]
+    holders, opposite = np.nonzero(body.links[: body.n_tetrahedra] == CUT)
+    corners = (opposite[:, None] + np.arange(1, 4)) % 4
+    normal = np.cross(place.ahead, [0.0, 0.0, 1.0])
+    both_sides = np.zeros(2)
+    for face in body.rest[tetrahedra[holders[:, None], corners]]:
+        polygon = _clipped(face, place.along(face) - place.first)
+        polygon = _clipped(polygon, place.first + AREAS_OVER - place.along(polygon))
+        if len(polygon) >= 3:
+            sides = polygon - polygon[0]
+            area = 0.5 * np.cross(sides[1:-1], sides[2:]).sum(axis=0)
+            both_sides += np.linalg.norm(area), abs(area @ normal)
+    return float(0.5 * both_sides[0]), float(0.5 * both_sides[1])
+
+
+def _clipped(polygon: FloatArray, inside: FloatArray) -> FloatArray:
+    """Return the part of a polygon, shape (n, 3), where a linear function, shape (n,), is >= 0."""
+    kept = []
+    for i in range(len(polygon)):
+        here, before = inside[i], inside[i - 1]
+        if (here >= 0.0) != (before >= 0.0):
+            share = before / (before - here)
+            kept.append(polygon[i - 1] + share * (polygon[i] - polygon[i - 1]))
+        if here >= 0.0:
+            kept.append(polygon[i])
+    return np.array(kept).reshape(-1, 3)
 
 
 def cutting_law(
@@ -273,7 +353,7 @@ def _result(found: list[tuple[str, str, LawCut, Measured]]) -> BenchmarkResult:
     by_tissue = {name: [m for n, _, _, m in found if n == name] for name, *_ in found}
     for name, measured in by_tissue.items():
         rows.values(name, None, [m.force for m in measured], "law", quantity="force")
-    columns = ("force", "ripple", "lowest", "swept", "opened", "paid", "released")
+    columns = ("force", "ripple", "lowest", "swept", "opened", "flat", "paid", "released")
 
     def show(console: "Console") -> None:
         table = compact_table("steady cuts, over the law", ("tissue", "mesh", "cut"), columns)
@@ -284,10 +364,12 @@ def _result(found: list[tuple[str, str, LawCut, Measured]]) -> BenchmarkResult:
             force = np.array([m.force for m in measured])
             paid = np.array([m.paid / m.swept for m in measured])
             opened = np.array([m.opened / m.swept for m in measured])
+            flat = np.array([m.flat / m.swept for m in measured])
             console.print(
                 f"{name}: force {force.mean():.3f}, {force.min():.3f} to {force.max():.3f}; "
                 f"paid / swept {paid.min():.3f} to {paid.max():.3f}; "
-                f"opened / swept {opened.min():.3f} to {opened.max():.3f}",
+                f"opened / swept {opened.min():.3f} to {opened.max():.3f}, "
+                f"flat {flat.min():.3f} to {flat.max():.3f}",
                 highlight=False,
             )
 
