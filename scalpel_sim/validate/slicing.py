@@ -27,6 +27,9 @@ _PLACES = (CUT_X, 0.0187, 0.0225)
 """Positions of the cuts across the block [m]: three places across an element."""
 _SLOW, SLICING_SPEED = 0.02, 0.05
 """Speeds across the edge [m/s]."""
+_CHATTER, _DAMPED = 75.0, 0.1
+"""Frequency at which an edge chatters that slides faster than it is pushed [Hz], and a damping
+ratio there at which it does not."""
 
 
 def _normal_force(toughness: float, ratio: float) -> float:
@@ -43,15 +46,20 @@ class SlicingForces(NamedTuple):
     """Force along the edge [N]."""
 
 
-def cut_by_slicing(ratio: float, speed: float, x: float = CUT_X) -> SlicingForces:
+def cut_by_slicing(
+    ratio: float, speed: float, x: float = CUT_X, damping: float | None = None
+) -> SlicingForces:
     """Cut through the block with an edge that is drawn down.
 
     Args:
         ratio: Speed along the edge over the speed across it.
         speed: Speed across the edge [m/s].
         x: Position of the cut across the block [m].
+        damping: Damping ratio of the block at `_CHATTER`; None for that of any soft material.
     """
     material = soft_material(young_modulus=_STIFFNESS, toughness=SLICING_TOUGHNESS)
+    if damping is not None:
+        material = material.with_damping(damping, _CHATTER)
     poses = straight_cut(speed, ratio=ratio, x=x)
     record = run_stroke(block_tissue(material, held=_HELD), poses)
     along = float(record.steady_rows(record.force[:, 2]).mean())
@@ -63,6 +71,7 @@ def check_slicing(
     speed: float,
     measured: Sequence[SlicingForces],
     toughness: float,
+    is_damped: bool = False,
 ) -> list[Check]:
     """Return the checks of the worst of several slicing cuts.
 
@@ -71,11 +80,13 @@ def check_slicing(
         speed: Speed across the edge [m/s].
         measured: The cuts.
         toughness: Toughness of the block [J/m2].
+        is_damped: Whether the block is, so that the edge does not chatter.
     """
     theory = _normal_force(toughness, ratio)
-    name = f"ratio {ratio:g}, {speed * 1e3:g} mm/s"
+    name = f"ratio {ratio:g}, {speed * 1e3:g} mm/s" + (", damped" if is_damped else "")
+    chatters = ratio > 1.0 and not is_damped
     across = farthest_from_one([each.across / theory for each in measured])
-    checks = [_LINES["slow" if speed == _SLOW else "normal"].check(name, across)]
+    checks = [_LINES["chatter" if chatters else "normal"].check(name, across)]
     if ratio > 0.0:
         along = farthest_from_one([each.along / (ratio * theory) for each in measured])
         checks.append(_LINES["along"].check(name, along))
@@ -95,6 +106,8 @@ def measure_slicing(quick: bool) -> Findings:
     if not quick:
         slow = [cut_by_slicing(2.0, _SLOW)]
         checks += check_slicing(2.0, _SLOW, slow, SLICING_TOUGHNESS)
+        damped = [cut_by_slicing(2.0, SLICING_SPEED, x, _DAMPED) for x in places]
+        checks += check_slicing(2.0, SLICING_SPEED, damped, SLICING_TOUGHNESS, is_damped=True)
     return Findings(checks, [_plot(np.array(ratios), np.array(at_first))])
 
 

@@ -40,7 +40,7 @@ def test_an_incision_as_theory_says_passes():
         ({"first": 4e-3}, 0),
         ({"first": 11e-3}, 0),
         ({"grows": 0.05}, 1),
-        ({"force": 1.06}, 2),
+        ({"force": 1.09}, 2),
         ({"paid": 0.94}, 3),
         ({"opened": 1.06}, 4),
     ],
