@@ -165,8 +165,9 @@ def test_it_is_the_same_on_the_tissue_itself_over_a_bridge_and_over_tcp():
 
 
 def test_convex_meshes_and_ellipsoids_of_a_model_push_too():
-    wedge, egg, _ = pressed(cube(frame=LYING))[-1]
-    assert wedge.force[2] > 0.05 and egg.force[2] < -0.05
+    wedges, eggs, _ = zip(*pressed(cube(frame=LYING)), strict=True)
+    assert max(wedge.force[2] for wedge in wedges) > 0.05
+    assert min(egg.force[2] for egg in eggs) < -0.05
 
 
 def test_the_broad_phase_changes_no_bit(monkeypatch):

@@ -119,8 +119,8 @@ def test_liver_as_published_is_cut_with_toughness_times_depth_and_pays_for_it():
     assert 0.95 * 164.0 * DEPTH <= drawn <= 1.02 * 164.0 * opened_there
     energies, opened = simulation.result.energies, simulation.result.cut_area
     assert opened == pytest.approx(asked, rel=0.05)
-    # By 0.1 permille of toughness it changes from 0.94 to 0.98: the mesh opens at its nodes.
-    assert energies.cutting / 164.0 == pytest.approx(opened, rel=0.07)
+    # By 0.1 permille of toughness it changes by 0.04: the mesh opens at its nodes, and roughly.
+    assert energies.cutting / 164.0 == pytest.approx(opened, rel=0.1)
     assert abs(energies.residual) < 0.01 * energies.work_of_blade
     assert simulation.link.cut_report().now.inverted == 0.0
     assert len(pieces_of(simulation.link.snapshot())) == 1
