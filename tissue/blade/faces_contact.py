@@ -122,6 +122,10 @@ class FaceContacts(Arrays):
     """Scratch: the row that each face found had before, or -1; shape (capacity,)."""
     states_before: ContactStates
     """Scratch: state of each row before a search."""
+    divided: IntArray
+    """Scratch: rows that a cut divided (`tissue.blade.divided_faces`), shape (capacity,)."""
+    node_before: IntArray
+    """Scratch: nodes of each of these, shape (capacity, 3)."""
     outward: IntArray
     """`faces.OUTWARD`."""
 
@@ -158,6 +162,8 @@ def _rows(capacity: int) -> dict[str, np.ndarray | ContactStates]:
         "node_around": np.zeros((capacity, 4), np.int64),
         "found": np.zeros(capacity, np.int64),
         "row_before": np.zeros(capacity, np.int64),
+        "divided": np.zeros(capacity, np.int64),
+        "node_before": np.zeros((capacity, 3), np.int64),
         "states_before": _new_states(capacity),
     }
 
@@ -175,7 +181,8 @@ def _new_states(capacity: int) -> ContactStates:
 def with_more_faces(sides: FaceContacts) -> FaceContacts:
     """Return the side contacts with room for twice as many faces."""
     n = 2 * len(sides.face)
-    names = ("face", "node", "around", "node_around", "found", "row_before")
+    lists = ("face", "node", "around", "node_around", "found", "row_before")
+    names = (*lists, "divided", "node_before")
     arrays = {name: grown(getattr(sides, name), n) for name in names}
     states = {name: grown(getattr(sides.states, name), n) for name in ContactStates.__annotations__}
     return sides.replaced(**arrays, states=ContactStates(**states), states_before=_new_states(n))

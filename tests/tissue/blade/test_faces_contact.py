@@ -12,6 +12,7 @@ from tissue.blade.edge import BladeCoordinates, Edge, motion_at, pose_at
 from tissue.blade.edge_anchors import new_anchors
 from tissue.blade.faces_contact import (
     POINTS,
+    ContactStates,
     blade_profile,
     new_face_contacts,
     with_more_faces,
@@ -23,6 +24,7 @@ from tissue.blade.faces_search import (
     forget_changed_faces,
     release_faces,
 )
+from tissue.blade.known_faces import continue_contact, note_divided
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import CUT, build_body
 from tissue.mesh.star import no_visits
@@ -79,6 +81,23 @@ class Pressed:
 
     def slide(self, edge):
         apply_sliding(self.blade, pose_at(edge, 1.0), self.body.positions, 1e-3)
+
+    def divide(self, wholes):
+        """Divide each of these faces at a third of its first edge, as a cut does."""
+        body, states, n = self.body, self.sides.states, len(wholes)
+        for name in ContactStates.__annotations__:
+            getattr(self.sides.states_before, name)[:] = getattr(states, name)
+        self.sides.row_of_face[:] = -1
+        assert note_divided(self.sides) == n
+        x = body.positions
+        middles = (x[wholes[:, 0]] + 2.0 * x[wholes[:, 1]]) / 3.0
+        self.body = body.replaced(positions=np.vstack([x, middles]))
+        self.forces = np.zeros_like(self.body.positions)
+        for i, (a, b, c) in enumerate(wholes.tolist()):
+            for row, corners in ((i, (a, len(x) + i, c)), (n + i, (c, len(x) + i, b))):
+                self.sides.node[row] = corners
+                assert continue_contact(self.blade, self.body, row, n)
+        self.sides.n_faces = 2 * n
 
 
 @pytest.fixture
@@ -268,6 +287,32 @@ def expect_as_new(pressed, grid, edge):
     forget_cells(pressed.sides)
     pressed.find_in(grid, edge)
     assert found == pressed.sides.face[pressed.rows()].tolist() == sorted(found)
+
+
+def test_skin_with_tissue_between_it_and_the_blade_is_not_touched():
+    """The blade stands in the block, 2 mm below its side, and goes forward by its bevel."""
+    pressed = Pressed(x=0.008)
+    assert not np.isclose(pressed.body.rest[pressed.sides.node[pressed.rows()], 0], 0.01).any()
+    assert not pressed.press(edge_at(0.008, y=0.021)).any()
+
+
+def test_the_parts_of_a_face_that_is_cut_press_and_rub_as_the_whole_did(pressed):
+    """Each face in contact is divided at a point of its first edge, and is looked for again."""
+    edge = edge_at(0.0108, y=0.0151)
+    pressed.slide(edge_at(0.0108))
+    pressed.press(edge)
+    pressed.slide(edge)
+    pressed.totals.angular_impulse[:] = 0.0
+    force = pressed.press(edge)
+    torque, n = pressed.totals.angular_impulse.copy(), pressed.sides.n_faces
+    assert n > 0 and pressed.sides.states.energy[:n].min() > 0.0
+    energy, wholes = pressed.sides.states.energy[:n].sum(), pressed.sides.node[:n].copy()
+    pressed.divide(wholes)
+    pressed.totals.angular_impulse[:] = 0.0
+    np.testing.assert_allclose(pressed.press(edge), force, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(pressed.totals.angular_impulse, torque, rtol=1e-9, atol=1e-12)
+    pressed.slide(edge)
+    assert pressed.sides.states.energy[: 2 * n].sum() == pytest.approx(energy, rel=1e-9)
 
 
 def test_side_contacts_add_stiffness_to_their_nodes(pressed):
