@@ -111,11 +111,18 @@ def slip_spine(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -
 
 @kernel
 def _follow(blade: BladeState, body: Body, visits: Visits, k: int, side: SpineSide) -> None:
-    """Move the point that piercing sample `k` holds sideways with it: tissue behind it is open."""
+    """Move the point that piercing sample `k` holds sideways with it: tissue behind it is open.
+
+    In strained tissue the point could come to lie deeper, and press harder by no work of the blade.
+    """
     spine = blade.spine
     stretch = sub(side.at, touched_point(spine, body, body.positions, k))
-    sideways = axpy(-dot(stretch, side.outward), side.outward, stretch)
-    _move_by(blade, body, visits, k, sideways)
+    depth = dot(stretch, side.outward)
+    _move_by(blade, body, visits, k, axpy(-depth, side.outward, stretch))
+    moved = sub(side.at, touched_point(spine, body, body.positions, k))
+    deeper = dot(moved, side.outward) - depth
+    if deeper > 0.0:
+        _move_by(blade, body, visits, k, scale(deeper, side.outward))
 
 
 @kernel

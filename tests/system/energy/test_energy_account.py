@@ -22,6 +22,7 @@ from tissue import (
     SolverSettings,
     Tissue,
     block,
+    lattice_block,
 )
 from tissue.stepping.energy_audit import MeshChanges
 
@@ -32,6 +33,9 @@ AFTER = 50
 
 CLOSED = 0.01
 """Largest residual, as a share of the work of the blade; 0.1 % was measured."""
+
+RELEASED = 0.02
+"""Energy that a blade releases or finds for nothing, at most, as a share of the stroke's work."""
 
 
 class Account(NamedTuple):
@@ -164,12 +168,16 @@ def test_contact_gives_back_hardly_anything(account):
     assert contact.sum() > 0.0
 
 
-def test_the_blade_releases_more_than_it_finds_bent(account):
-    """Springs of the edge that take hold of tissue beside them begin bent: 0.3 to 0.5 % of the
-    work, in a body of springs 1.7 to 2.7 %."""
+def test_the_blade_releases_and_finds_bent_hardly_anything(account):
+    """Springs of the edge that take hold of tissue beside them begin bent. Where the sides of the
+    blade pressed skin and old lips from within the tissue, 4 to 9 % of a stroke came to nothing."""
     released = account.steps("released")
     assert released[released < 0.0].sum() > (-0.04 if account.is_of_springs else -0.015)
-    assert 0.0 < released.sum() < 0.12
+    assert abs(released.sum()) < RELEASED
+    before = Energies(*np.zeros(len(Energies._fields)))
+    for one, other in itertools.pairwise((before, *account.strokes)):
+        work = other.work_of_blade - one.work_of_blade
+        assert abs(other.released - one.released) < RELEASED * work
 
 
 @pytest.mark.parametrize("blade", [None, BladeShape()])
@@ -196,6 +204,45 @@ def test_a_blade_that_is_dragged_sideways_and_back_gains_no_energy(relaxation, b
     # Samples that take hold beside others find tissue that is bent: 3.7 % of the work.
     assert min(energies.released for energies in account) > -0.05 * work
     assert max(abs(energies.residual) for energies in account) < CLOSED * work
+
+
+@pytest.mark.parametrize("make_mesh", [block, lattice_block])
+def test_strokes_that_go_in_and_out_and_slide_give_and_lose_nothing(make_mesh):
+    """In soft tissue, across earlier cuts. A stab that was drawn on gained 8 % of the work."""
+    mesh = make_mesh((8, 8, 4), SIZE)
+    material = Material(young_modulus=10e3, poisson_ratio=0.45, toughness=8.0, blade_friction=0.2)
+    solver = SolverSettings(audit=True)
+    tissue = Tissue(mesh, material, fixed=sides(mesh), blade=BladeShape(), solver=solver)
+    tissue.settle()
+    random = np.random.default_rng(7)
+    friction, before = 0.0, Energies(*np.zeros(len(Energies._fields)))
+    for speed in (0.03, 0.2, 0.1, 0.1):
+        poses = itertools.pairwise(plunging_stroke(random, speed))
+        for sweep in (*itertools.starmap(BladeSweep, poses), *[None] * AFTER):
+            now = tissue.step(sweep, STROKE_DT).energies
+            assert now.friction > friction - 1e-9 * max(now.work_of_blade, 1e-6)
+            friction = now.friction
+        work = now.work_of_blade - before.work_of_blade
+        assert abs(now.released - before.released) < RELEASED * work
+        assert abs(now.residual) < CLOSED * now.work_of_blade
+        before = now
+
+
+def plunging_stroke(random, speed):
+    """Return the poses of an edge that crosses the block, goes in and out, and slides."""
+    yaw, lean, phase = random.uniform(0.0, 2.0 * np.pi), random.uniform(-0.4, 0.4), random.random()
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    aside = np.array([-ahead[1], ahead[0], 0.0])
+    up = np.cos(lean) * np.array([0.0, 0.0, 1.0]) + np.sin(lean) * aside
+    middle = np.array([0.02, 0.02, 0.0]) + random.uniform(-0.01, 0.01) * aside
+    depth, slide = random.uniform(4e-3, 12e-3), random.uniform(-0.2, 0.2)
+    edges = []
+    for travel in np.arange(-0.03, 0.03, speed * STROKE_DT):
+        wave = max(np.sin(2.0 * np.pi * (travel / 0.04 + phase)), 0.0)
+        raised = wave * (depth + 4e-3) + slide * (travel + 0.03)
+        tip = middle + travel * ahead + raised * up + np.array([0.0, 0.0, SIZE[2] - depth])
+        edges.append(BladeSegment(tip, tip + 0.04 * up, ahead))
+    return edges
 
 
 DRAG_DT, DRAG_SPEED = 1e-3, 0.05
