@@ -95,6 +95,7 @@ CUTS = (
     LawCut("through, 37 degrees", 0.0225, 0.1, angle=37.0),
     LawCut("sliding by 0.7", 0.0187, 0.1, speed=0.06, slide=0.7),
     LawCut("sliding by 1.5", 0.0187, 0.1, speed=0.06, slide=1.5),
+    LawCut("slowest", 0.0187, 0.0087, speed=0.005),
 )
 """The cuts of every block."""
 
