@@ -37,6 +37,10 @@ CLOSED = 0.01
 RELEASED = 0.02
 """Energy that a blade releases or finds for nothing, at most, as a share of the stroke's work."""
 
+GIVEN_BACK = 1e-3
+"""Energy that friction gives back, at most, as a share of the work of the blade: a point that is
+moved through strained tissue keeps its depth to second order."""
+
 
 class Account(NamedTuple):
     """The accounts of a body, one after each time step, as arrays of their terms [J]."""
@@ -215,17 +219,17 @@ def test_strokes_that_go_in_and_out_and_slide_give_and_lose_nothing(make_mesh):
     tissue = Tissue(mesh, material, fixed=sides(mesh), blade=BladeShape(), solver=solver)
     tissue.settle()
     random = np.random.default_rng(7)
-    friction, before = 0.0, Energies(*np.zeros(len(Energies._fields)))
+    given_back, now = 0.0, Energies(*np.zeros(len(Energies._fields)))
     for speed in (0.03, 0.2, 0.1, 0.1):
-        poses = itertools.pairwise(plunging_stroke(random, speed))
+        before, poses = now, itertools.pairwise(plunging_stroke(random, speed))
         for sweep in (*itertools.starmap(BladeSweep, poses), *[None] * AFTER):
-            now = tissue.step(sweep, STROKE_DT).energies
-            assert now.friction > friction - 1e-9 * max(now.work_of_blade, 1e-6)
             friction = now.friction
+            now = tissue.step(sweep, STROKE_DT).energies
+            given_back += max(friction - now.friction, 0.0)
         work = now.work_of_blade - before.work_of_blade
         assert abs(now.released - before.released) < RELEASED * work
         assert abs(now.residual) < CLOSED * now.work_of_blade
-        before = now
+        assert given_back < GIVEN_BACK * now.work_of_blade
 
 
 def plunging_stroke(random, speed):
