@@ -47,15 +47,15 @@ def test_the_contacts_add_up_to_the_wrench(cut):
 
 
 def test_the_cut_areas_of_the_contacts_add_up_to_that_of_the_step():
-    tissue, result, pose = cut_to(0.02)
-    poses = [edge_at(pose.tip[1] + i * 1e-4) for i in range(41)]
+    tissue, result, pose = cut_to(0.015)
+    poses = [edge_at(pose.tip[1] + i * 1e-4) for i in range(101)]
     areas, works = [], [result.work_of_cutting]
     for a, b in itertools.pairwise(poses):
         result = tissue.step(BladeSweep(a, b), DT)
         areas.append(result.contacts.cut_area.sum())
         works.append(result.work_of_cutting)
     np.testing.assert_allclose(np.array(areas) * TOUGH.toughness, np.diff(works), rtol=1e-9)
-    assert sum(areas) == pytest.approx(4e-3 * 0.02, rel=0.15)  # the lips spring forward
+    assert sum(areas) == pytest.approx(0.01 * 0.02, rel=0.1)  # the lips spring forward
 
 
 def test_contacts_are_views_without_a_copy(cut):
