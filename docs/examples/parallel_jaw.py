@@ -44,7 +44,7 @@ tissue = Tissue(cube, soft)
 touch = GeomCoupling(data, tissue)  # with the table, the palm and both pads
 
 height = tissue.pieces()[0].centre[2]
-while data.time < 1.3:
+while data.time < 2.0:
     data.ctrl[1:] = 1.5 * min(data.time / 0.2, 1.0)  # the pads press with 1.5 N,
     data.ctrl[0] = 0.02 * np.clip((data.time - 0.4) / 0.5, 0.0, 1.0)  # then the hand goes up
     mujoco.mj_step1(model, data)

@@ -87,6 +87,7 @@ def test_without_recording_episodes_do_not_grow_memory():
     def episode() -> int:
         simulation.reset()
         simulation.run(0.02)
+        gc.collect()
         return tracemalloc.get_traced_memory()[0]
 
     tracemalloc.start()
