@@ -59,17 +59,27 @@ def keep_gradient(solid: Solid, block: int, gradient: MatrixRows) -> None:
     """Keep the rows of H of the tetrahedra of a block."""
     width = width_of(solid.shape)
     at = 9 * width * block
-    _store_vector(solid, at, gradient[0])
-    _store_vector(solid, at + 3 * width, gradient[1])
-    _store_vector(solid, at + 6 * width, gradient[2])
+    store_vector(solid.gradient, at, gradient[0])
+    store_vector(solid.gradient, at + 3 * width, gradient[1])
+    store_vector(solid.gradient, at + 6 * width, gradient[2])
 
 
 @inlined
-def _store_vector(solid: Solid, at: int, v: Vec3) -> None:
-    width = width_of(solid.shape)
-    store_block(solid.gradient, at, v.x)
-    store_block(solid.gradient, at + width, v.y)
-    store_block(solid.gradient, at + 2 * width, v.z)
+def store_vector(rows: FloatArray, at: int, v: Vec3) -> None:
+    """Write the x, y and z of the tetrahedra of a block to three rows, the first at `at`."""
+    width = width_of(rows)
+    store_block(rows, at, v.x)
+    store_block(rows, at + width, v.y)
+    store_block(rows, at + 2 * width, v.z)
+
+
+@inlined
+def load_vector(rows: FloatArray, at: int) -> Vec3:
+    """Return what `store_vector` wrote."""
+    width = width_of(rows)
+    return Vec3(
+        load_block(rows, at), load_block(rows, at + width), load_block(rows, at + 2 * width)
+    )
 
 
 @inlined
@@ -79,9 +89,9 @@ def known_gradient(solid: Solid, block: int) -> MatrixRows:
         width = width_of(solid.shape)
         at = 9 * width * block
         return (
-            _load_vector(solid, at),
-            _load_vector(solid, at + 3 * width),
-            _load_vector(solid, at + 6 * width),
+            load_vector(solid.gradient, at),
+            load_vector(solid.gradient, at + 3 * width),
+            load_vector(solid.gradient, at + 6 * width),
         )
     return gradient_of_displacement(solid, block)
 
@@ -100,16 +110,6 @@ def _corners(solid: Solid, block: int, k: int) -> tuple[Lanes, Lanes, Lanes]:
     """Return the displacements of corner `k` of the tetrahedra of a block."""
     width = width_of(solid.shape)
     return points_of_rows(solid.displacement, solid.nodes, width * (4 * block + k))
-
-
-@inlined
-def _load_vector(solid: Solid, at: int) -> Vec3:
-    width = width_of(solid.shape)
-    return Vec3(
-        load_block(solid.gradient, at),
-        load_block(solid.gradient, at + width),
-        load_block(solid.gradient, at + 2 * width),
-    )
 
 
 @inlined

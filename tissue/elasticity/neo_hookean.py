@@ -50,7 +50,7 @@ from tissue.elasticity.gradients import (
     shape_of,
 )
 from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
-from tissue.elasticity.stress import MatrixRows, cofactors_of, stress_of
+from tissue.elasticity.stress import MatrixRows, cofactors_of, product_with, stress_of
 from tissue.laws.kernels import isotropic_factor, stiffening_factor, stiffens, stretch_invariant
 from tissue.mesh.body import Body
 
@@ -235,10 +235,28 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool, is_averaged: 
         )
     if has_relaxed:
         px, py, pz = with_relaxed(solid.relaxed, width * block, v, (px, py, pz), (x, y, z))
-    f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
-    f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
-    f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))
-    f0 = scale(splat(-1.0, v), add(f1, add(f2, f3)))
+    g1 = gradient_of_shape(solid, block, 0)
+    g2 = gradient_of_shape(solid, block, 3)
+    g3 = gradient_of_shape(solid, block, 6)
+    store_corner_forces(solid, block, (px, py, pz), (g1, g2, g3))
+
+
+@inlined
+def store_corner_forces(solid: Solid, block: int, stress: MatrixRows, normals: MatrixRows) -> None:
+    """Write the forces on the corners of the tetrahedra of a block [N].
+
+    Args:
+        solid: Written.
+        block: The block.
+        stress: Rows of -V times a stress [N m].
+        normals: The directions 1, 2 and 3 that it acts across [1/m]; that of corner 0 is minus
+            their sum.
+    """
+    width = width_of(solid.shape)
+    n1, n2, n3 = normals
+    f1, f2 = product_with(stress, n1), product_with(stress, n2)
+    f3 = product_with(stress, n3)
+    f0 = scale(splat(-1.0, f1.x), add(f1, add(f2, f3)))
     row = 4 * width * (1 + block)
     store_rows(solid.forces, row, f0.x, f0.y, f0.z)
     store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
@@ -285,11 +303,6 @@ def _dilated(v: Lanes, x: Vec3, y: Vec3, z: Vec3, cofactors: MatrixRows) -> Lane
     cx, cy, cz = cofactors
     growth = (x.x + y.y + z.z) + (cx.x + cy.y + cz.z) + dot(x, cx)
     return v * growth
-
-
-@inlined
-def _product(px: Vec3, py: Vec3, pz: Vec3, g: Vec3) -> Vec3:
-    return Vec3(dot(px, g), dot(py, g), dot(pz, g))
 
 
 @inlined

@@ -18,6 +18,21 @@ def cofactors_of(x: Vec3, y: Vec3, z: Vec3) -> MatrixRows:
 
 
 @inlined
+def deformed_cofactors(x: Vec3, y: Vec3, z: Vec3) -> MatrixRows:
+    """Return the rows of cof F from the rows of H."""
+    one = splat(1.0, x.x)
+    f1, f2, f3 = Vec3(x.x + one, x.y, x.z), Vec3(y.x, y.y + one, y.z), Vec3(z.x, z.y, z.z + one)
+    return cofactors_of(f1, f2, f3)
+
+
+@inlined
+def product_with(rows: MatrixRows, v: Vec3) -> Vec3:
+    """Return the product of a matrix with a vector."""
+    x, y, z = rows
+    return Vec3(dot(x, v), dot(y, v), dot(z, v))
+
+
+@inlined
 def stress_of(
     a: Lanes, b: Lanes, c: Lanes, gradient: MatrixRows, cofactors: MatrixRows
 ) -> MatrixRows:

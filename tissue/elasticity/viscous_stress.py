@@ -23,9 +23,10 @@ G. So n_k is multiplied by
 
     2 / (1 + G),   at most 1 / sqrt(G),     G at least 1, of the face that has grown most
 
-Then no face resists more than at rest, and the bound on frequencies at rest
-(`tissue.elasticity.frequency.at_rest`) bounds the rates of decay for any strain. A tetrahedron that
-is pressed flat, or inside out, is as any other.
+Then no face resists more than at rest. That the bound on frequencies at rest
+(`tissue.elasticity.frequency.at_rest`) then bounds the rates of decay at any strain is measured and
+not proven: faces of neighbours may come to align. A tetrahedron that is pressed flat, or inside
+out, is as any other.
 
 Three loops, after the gradients of displacement: rates of blocks, averages of nodes, forces of
 blocks.
@@ -36,9 +37,9 @@ from typing import Final
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, point
-from tissue.core.simd_blocks import load_block, splat, store_block, width_of
+from tissue.core.simd_blocks import splat, store_block, width_of
 from tissue.core.simd_columns import store_columns, store_sum_of_rows, sums_of_four_rows
-from tissue.core.simd_points import points_of_rows, store_everywhere, store_row, store_rows
+from tissue.core.simd_points import points_of_rows, store_everywhere, store_row
 from tissue.core.simd_rows import natural, where_larger
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays
@@ -49,10 +50,17 @@ from tissue.elasticity.gradients import (
     gradient_of_displacement,
     gradient_of_shape,
     known_gradient,
+    load_vector,
     shape_of,
+    store_vector,
 )
-from tissue.elasticity.neo_hookean import has_averages, sum_around, sum_of_corners
-from tissue.elasticity.stress import MatrixRows, cofactors_of
+from tissue.elasticity.neo_hookean import (
+    has_averages,
+    store_corner_forces,
+    sum_around,
+    sum_of_corners,
+)
+from tissue.elasticity.stress import MatrixRows, deformed_cofactors, product_with
 from tissue.laws.energy_density import EnergyDensity
 from tissue.mesh.body import Body
 
@@ -195,11 +203,11 @@ def _write_rates(
     along, across = _rate_of((u1, u2, u3), (n1, n2, n3))
     width, v = width_of(solid.shape), shape_of(solid, block, VOLUME)
     at = width * N_RATES * block
-    _store_vector(viscosity, at, n1)
-    _store_vector(viscosity, at + 3 * width, n2)
-    _store_vector(viscosity, at + 6 * width, n3)
-    _store_vector(viscosity, at + _RATE * width, along)
-    _store_vector(viscosity, at + (_RATE + 3) * width, across)
+    store_vector(viscosity.rates, at, n1)
+    store_vector(viscosity.rates, at + 3 * width, n2)
+    store_vector(viscosity.rates, at + 6 * width, n3)
+    store_vector(viscosity.rates, at + _RATE * width, along)
+    store_vector(viscosity.rates, at + (_RATE + 3) * width, across)
     place = width * (1 + block)
     if is_averaged:
         a, b, none = scale(v, along), scale(v, across), splat(0.0, v)
@@ -235,15 +243,11 @@ def _faces(solid: Solid, block: int, gradient: MatrixRows) -> MatrixRows:
         block: The block.
         gradient: Rows of H.
     """
-    x, y, z = gradient
-    one = splat(1.0, x.x)
-    c = cofactors_of(
-        Vec3(x.x + one, x.y, x.z), Vec3(y.x, y.y + one, y.z), Vec3(z.x, z.y, z.z + one)
-    )
+    c, one = deformed_cofactors(*gradient), splat(1.0, gradient[0].x)
     g1 = gradient_of_shape(solid, block, 0)
     g2 = gradient_of_shape(solid, block, 3)
     g3 = gradient_of_shape(solid, block, 6)
-    n1, n2, n3 = _product(c, g1), _product(c, g2), _product(c, g3)
+    n1, n2, n3 = product_with(c, g1), product_with(c, g2), product_with(c, g3)
     # G = now / before, without a division for each face. Rows without a tetrahedron have no faces.
     now, before = _more_grown(one, one, n1, g1)
     now, before = _more_grown(now, before, n2, g2)
@@ -269,12 +273,6 @@ def _more_grown(now: Lanes, before: Lanes, n: Vec3, g: Vec3) -> tuple[Lanes, Lan
         where_larger(of_other, of_this, squared, now),
         where_larger(of_other, of_this, at_rest, before),
     )
-
-
-@inlined
-def _product(c: MatrixRows, g: Vec3) -> Vec3:
-    c1, c2, c3 = c
-    return Vec3(dot(c1, g), dot(c2, g), dot(c3, g))
 
 
 @inlined
@@ -331,10 +329,10 @@ def _viscous_forces_of(viscosity: Viscosity, solid: Solid, block: int, is_averag
     """
     width, v = width_of(solid.shape), shape_of(solid, block, VOLUME)
     at = width * N_RATES * block
-    n1, n2 = _load_vector(viscosity, at), _load_vector(viscosity, at + 3 * width)
-    n3 = _load_vector(viscosity, at + 6 * width)
-    along = _load_vector(viscosity, at + _RATE * width)
-    across = _load_vector(viscosity, at + (_RATE + 3) * width)
+    n1, n2 = load_vector(viscosity.rates, at), load_vector(viscosity.rates, at + 3 * width)
+    n3 = load_vector(viscosity.rates, at + 6 * width)
+    along = load_vector(viscosity.rates, at + _RATE * width)
+    across = load_vector(viscosity.rates, at + (_RATE + 3) * width)
     own_mu, own_lam, mean_mu, mean_lam = viscous_moduli(solid.law)
     minus_v = splat(-1.0, v) * v
     twice = splat(2.0 * own_mu, v)
@@ -353,13 +351,7 @@ def _viscous_forces_of(viscosity: Viscosity, solid: Solid, block: int, is_averag
     ty = Vec3(across.x, along.y + p, across.y)
     tz = Vec3(across.z, across.y, along.z + p)
     stress = scale(minus_v, tx), scale(minus_v, ty), scale(minus_v, tz)
-    f1, f2, f3 = _product(stress, n1), _product(stress, n2), _product(stress, n3)
-    f0 = scale(splat(-1.0, v), add(f1, add(f2, f3)))
-    row = 4 * width * (1 + block)
-    store_rows(solid.forces, row, f0.x, f0.y, f0.z)
-    store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
-    store_rows(solid.forces, row + 2 * width, f2.x, f2.y, f2.z)
-    store_rows(solid.forces, row + 3 * width, f3.x, f3.y, f3.z)
+    store_corner_forces(solid, block, stress, (n1, n2, n3))
 
 
 @kernel
@@ -374,21 +366,3 @@ def viscous_moduli(law: EnergyDensity) -> tuple[float, float, float, float]:
     own_lam = own if law.lam_of_nodes == 0.0 else max(own, LEAST_LAM * own_mu)
     mean_lam = law.lam_of_nodes - of_nodes * law.excess + (own - own_lam)
     return own_mu, own_lam, mean_mu, mean_lam
-
-
-@inlined
-def _store_vector(viscosity: Viscosity, at: int, v: Vec3) -> None:
-    width = width_of(viscosity.rates)
-    store_block(viscosity.rates, at, v.x)
-    store_block(viscosity.rates, at + width, v.y)
-    store_block(viscosity.rates, at + 2 * width, v.z)
-
-
-@inlined
-def _load_vector(viscosity: Viscosity, at: int) -> Vec3:
-    width = width_of(viscosity.rates)
-    return Vec3(
-        load_block(viscosity.rates, at),
-        load_block(viscosity.rates, at + width),
-        load_block(viscosity.rates, at + 2 * width),
-    )

@@ -16,12 +16,18 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import gathered_like, load_block, splat, store_block, width_of
 from tissue.core.simd_rows import any_above, larger, largest, where_larger
-from tissue.core.vec3 import Vec3, add, cross, dot
+from tissue.core.vec3 import Vec3, add, dot
 from tissue.elasticity.averaged_shear import mean_of_nodes
 from tissue.elasticity.finite_elements import Solid, averages_shear, n_blocks
 from tissue.elasticity.gradients import gradient_of_displacement, gradient_of_shape, known_gradient
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.stress import MatrixRows, cofactors_of, shear_stiffness
+from tissue.elasticity.stress import (
+    MatrixRows,
+    cofactors_of,
+    deformed_cofactors,
+    product_with,
+    shear_stiffness,
+)
 from tissue.laws.kernels import (
     stiffening_factor,
     stiffens,
@@ -65,7 +71,7 @@ def list_fast_blocks(solid: Solid, n_tetrahedra: int, allowed: float, is_known: 
             more = stiffness if stiffens(law) else stiffness - one
             room = room - load_block(solid.shear_share, place) * more
             least = where_larger(stiffness, least, room, least)
-        cofactors = _cofactors(x, y, z)
+        cofactors = deformed_cofactors(x, y, z)
         room = larger(room, least)
         if _grows_further(solid, block, cofactors, room):
             solid.fast_blocks[n] = block
@@ -91,7 +97,7 @@ def quick_bounds(elastic: Elastic, block: int, is_known: bool) -> float:
     solid = elastic.solid
     place = width_of(solid.shape) * (1 + block)
     x, y, z = _gradient(solid, block, is_known)
-    growth = _growth(solid, block, _cofactors(x, y, z))
+    growth = _growth(solid, block, deformed_cofactors(x, y, z))
     at_rest = _highest_with_contact(elastic, solid, block, growth)
     bound = growth * at_rest
     further = growth / load_block(solid.tested_growth, place)
@@ -150,14 +156,6 @@ def _of_corners(
         gathered_like(a, values, nodes, first + 2 * width),
         gathered_like(a, values, nodes, first + 3 * width),
     )
-
-
-@inlined
-def _cofactors(x: Vec3, y: Vec3, z: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the rows of cof F from the rows of H."""
-    one = splat(1.0, x.x)
-    f1, f2, f3 = Vec3(x.x + one, x.y, x.z), Vec3(y.x, y.y + one, y.z), Vec3(z.x, z.y, z.z + one)
-    return cross(f2, f3), cross(f3, f1), cross(f1, f2)
 
 
 @inlined
@@ -249,8 +247,7 @@ def _stiffness_of_law(solid: Solid, block: int, gradient: MatrixRows, is_known: 
 
 
 @inlined
-def _square(cofactors: tuple[Vec3, Vec3, Vec3], g: Vec3) -> Lanes:
+def _square(cofactors: MatrixRows, g: Vec3) -> Lanes:
     """Return |C g|^2 from the rows of C."""
-    c1, c2, c3 = cofactors
-    a, b, c = dot(c1, g), dot(c2, g), dot(c3, g)
-    return a * a + b * b + c * c
+    n = product_with(cofactors, g)
+    return dot(n, n)
