@@ -74,6 +74,7 @@ KEY_OF = {option: key for keys in KEYS_OF_GROUP.values() for option, key in keys
 """Key of each of these options."""
 
 _AS_OPTION = {
+    "gravity": " On the command line X,Y,Z.",
     "prony": " On the command line G:TAU of each term, such as 0.3:0.1,0.2:5.",
 }
 """What the help of an option says besides the text of its key."""

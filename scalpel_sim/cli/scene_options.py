@@ -235,8 +235,10 @@ def _parsed(option: str, value: Any) -> Any:
     """Return the value of an option as a file has it.
 
     Raises:
-        UsageError: the text is no Prony series, `0.3:0.1,0.2:5`.
+        UsageError: the text is no number or vector, or no Prony series, `0.3:0.1,0.2:5`.
     """
+    if option == "gravity":
+        return _number_or_vector(option, str(value))
     if option != "prony":
         return value
     pairs = []
@@ -250,3 +252,19 @@ def _parsed(option: str, value: Any) -> Any:
                 "as 0.3:0.1,0.2:5"
             ) from None
     return pairs
+
+
+def _number_or_vector(option: str, text: str) -> float | list[float]:
+    """Return a number, or the three numbers of X,Y,Z.
+
+    Raises:
+        UsageError: a part of the text is no number.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise UsageError(
+            f"--{option} is '{text}'; write a number, or three separated by commas, such as "
+            "0,0,-9.81"
+        ) from None
+    return numbers if len(numbers) > 1 else numbers[0]

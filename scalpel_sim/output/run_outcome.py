@@ -211,7 +211,7 @@ class RunOutcome:
     def friction_of_table(self) -> float | None:
         """The most that friction with the table held the body with [N]; None where more held it.
 
-        Its normal force is the weight, and what the blade pushed down when it pulled hardest.
+        Its normal force is the weight on it, and what the blade pushed down when it pulled hardest.
         """
         settings = self.settings
         others = self.first.fixed.any() or self.recording.hands or self.recording.n_held
@@ -223,7 +223,7 @@ class RunOutcome:
         hardest = int(np.linalg.norm(force[:, :2], axis=1).argmax())
         corners = self.first.rest_positions[self.first.tetrahedra]
         volume = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum()) / 6.0
-        weight = self.tissue.material.density * volume * settings["gravity"]
+        weight = self.tissue.material.density * volume * _downwards(settings["gravity"])
         return float(friction * max(weight + float(force[hardest, 2]), 0.0))
 
     @cached_property
@@ -240,6 +240,11 @@ class RunOutcome:
         ways = np.diff([0.5 * (pose.tip + pose.heel) for pose in middles], axis=0)
         speeds = np.maximum((ways * self.forwards).sum(axis=1), 0.0) / self.dt
         return np.asarray(slow * (1.0 + (speeds / law.doubling_speed) ** law.exponent))
+
+
+def _downwards(gravity: float | tuple[float, ...]) -> float:
+    """Return the part of a gravity that presses on a table [m/s2]; that of a number is all."""
+    return gravity if isinstance(gravity, (int, float)) else -gravity[2]
 
 
 def outcome_of(

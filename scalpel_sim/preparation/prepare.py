@@ -87,6 +87,9 @@ def prepare(
         stands = project_arm_in(scene, stroke, motions, around, needed)
     else:
         stands = own_arm_in(scene, stroke, motions, around)
+    if np.ndim(scene.world.gravity) > 0:
+        fall = stands.frame.vectors_to_world(np.array(scene.world.free_fall))
+        stands.arm.model.opt.gravity[:] = fall
     _warn_of_weakness(needed, stands.arm)
     standing = [each for each in stands.others if isinstance(each, StandingFixture)]
     simulation = Simulation(

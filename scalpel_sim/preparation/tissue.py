@@ -66,7 +66,7 @@ def make_tissue(scene: Scene) -> Tissue:
         scene.material,
         fixed=fixed,
         positions=pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by),
-        gravity=(0.0, 0.0, -scene.world.gravity),
+        gravity=scene.world.free_fall,
         floor=scene.world.floor,
         blade=scene.blade,
         solver=SolverSettings(
@@ -176,7 +176,7 @@ def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:
         remedies.append(f"--poisson-ratio {_HARDLY_COMPRESSIBLE}")
     remedies.append("a larger --young")
     remedies += ["less --stretch"] * (scene.body.stretched_by != 0.0)
-    remedies += ["less --gravity"] * (scene.world.gravity > 0.0)
+    remedies += ["less --gravity"] * any(scene.world.free_fall)
     _log.warning(
         "settled, %.2g %% of the tetrahedra are inside out, and the body has %.3g %% of its "
         "volume: forces on a blade there mean little. What may help: %s, or a mesh without flat "

@@ -136,7 +136,7 @@ def virtual_coupling(arm: ArmTable) -> VirtualCoupling | None:
     return None
 
 
-def check_range(stretch: float, gravity: float, seconds: float | None) -> None:
+def check_range(stretch: float, gravity: Sequence[float], seconds: float | None) -> None:
     """Check numbers whose range is wider than any scene needs.
 
     Raises:
@@ -144,8 +144,8 @@ def check_range(stretch: float, gravity: float, seconds: float | None) -> None:
     """
     if not -0.5 <= stretch <= 1.0:
         raise UsageError(f"stretch is {stretch}; it is a fraction from -0.5 to 1")
-    if not 0.0 <= gravity <= 100.0:
-        raise UsageError(f"gravity is {gravity} m/s2; it must lie between 0 and 100")
+    if not math.hypot(*gravity) <= 100.0:
+        raise UsageError(f"gravity is {math.hypot(*gravity):g} m/s2; it must be at most 100")
     if seconds is not None and not 0.0 < seconds <= LONGEST_RUN:
         raise UsageError(f"seconds is {seconds}; it must be above 0 and at most {LONGEST_RUN:g}")
 

@@ -92,7 +92,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_strokes(self.strokes)
         check_solver(self.solver, self.material)
         _ = self.cut, self.blade  # they check themselves
-        check_range(self.body.stretched_by, self.world.gravity, self.seconds)
+        check_range(self.body.stretched_by, self.world.free_fall, self.seconds)
         check_arm(self.arm, self.world)
         check_rows("attachment", self.attachments, check_attachment)
         check_rows("grasper", self.graspers, check_grasper)

@@ -15,6 +15,7 @@ from scalpel_sim.tables.values import (
     FileName,
     Finite,
     FourNumbers,
+    Gravity,
     Label,
     LawName,
     Name,
@@ -128,8 +129,9 @@ class BladeTable(TomlTable, kw_only=True, frozen=True):
 class WorldTable(TomlTable, kw_only=True, frozen=True):
     """`[world]`: what is around the body."""
 
-    gravity: NotNegative = STANDARD_GRAVITY
-    """Gravity, downwards [m/s2]."""
+    gravity: Gravity = STANDARD_GRAVITY
+    """Gravity [m/s2]: a number, downwards; or a vector, [x, y, z], which is that of the arm's world
+    as well."""
     floor: Finite | None = None
     """Height of a floor [m], below the body: pieces that are cut loose land on it."""
     table: Finite | None = None
@@ -141,6 +143,14 @@ class WorldTable(TomlTable, kw_only=True, frozen=True):
     """Origin of the tissue in the world of an arm of your own [m]."""
     quat: FourNumbers = (1.0, 0.0, 0.0, 0.0)
     """Rotation of the tissue there: w, x, y, z."""
+
+    @property
+    def free_fall(self) -> tuple[float, float, float]:
+        """Gravity as a vector, tissue frame [m/s2]."""
+        if isinstance(self.gravity, (int, float)):
+            return 0.0, 0.0, -self.gravity
+        x, y, z = self.gravity
+        return x, y, z
 
     @property
     def stop(self) -> float:

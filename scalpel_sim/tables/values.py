@@ -90,6 +90,12 @@ ThreeNumbers = Annotated[_Three, Meta(description="three numbers: [x, y, z]")]
 FourNumbers = Annotated[
     tuple[Finite, Finite, Finite, Finite], Meta(description="four numbers: [w, x, y, z]")
 ]
+# msgspec 0.23 mixes up the bounds of a number with the length of a tuple of three beside it.
+_OfThree = Annotated[tuple[Finite, ...], Meta(min_length=3, max_length=3)]
+Gravity = Annotated[
+    Annotated[float, Meta(ge=0.0, le=_LARGEST)] | _OfThree,
+    Meta(description="a number, 0 or more, or a vector of three: [x, y, z]"),
+]
 RowsOfThree = Annotated[
     list[_Three], Meta(min_length=1, description="rows of three numbers: [[x, y, z], ...]")
 ]

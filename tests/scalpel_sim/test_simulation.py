@@ -216,6 +216,15 @@ def test_a_body_that_folds_as_it_settles_gets_a_warning_that_names_what_helps(ca
     )  # only what there is
 
 
+def test_supports_carry_the_weight_along_gravity():
+    gravity = (3.0, -4.0, 2.0)
+    tissue = make_tissue(changed(GRID2, gravity=gravity, stretch=0.0))
+    weight = tissue.snapshot().masses.sum() * np.array(gravity)
+    carried = tissue.support_forces().sum(axis=0)
+    # Settling ends at 1e-3 of the largest force.
+    np.testing.assert_allclose(carried, -weight, rtol=2e-3)
+
+
 def test_springs_that_the_blade_would_fold_are_refused_before_the_body_settles(monkeypatch):
     monkeypatch.setattr(Tissue, "settle", lambda tissue: pytest.fail("it settles"))
     with pytest.raises(ValueError, match=r"springs fold ahead of the blade above 0\.6"):

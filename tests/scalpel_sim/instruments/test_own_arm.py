@@ -172,3 +172,13 @@ def test_a_scene_with_an_arm_of_its_own_reads_back_the_same(tmp_path):
     found = read_scene(path)
     assert Path(found.arm.model).resolve() == ROBOT.resolve()
     assert changed(found, model=scene.arm.model).settings() == scene.settings()
+
+
+def test_the_world_of_the_arm_has_the_gravity_of_the_tissue_turned(tmp_path):
+    angle = np.radians(10.0)
+    quat = [float(np.cos(angle / 2.0)), 0.0, 0.0, float(np.sin(angle / 2.0))]
+    turned = scene_with(tmp_path, ("[world]", f"[world]\ngravity = [1, 2, -9]\nquat = {quat}"))
+    gravity = prepare(read_scene(turned)).arm.model.opt.gravity
+    cosine, sine = np.cos(angle), np.sin(angle)
+    expected = [cosine - 2.0 * sine, sine + 2.0 * cosine, -9.0]
+    np.testing.assert_allclose(gravity, expected, atol=1e-12)

@@ -117,6 +117,18 @@ def test_a_later_layer_overrides_an_earlier_one(tmp_path, monkeypatch):
     assert chosen_scene(str(path), optioned).world.gravity == 4.0
 
 
+def test_gravity_is_a_number_downwards_or_a_vector():
+    assert chosen_scene("slab", TissueOptions()).world.free_fall == (0.0, 0.0, -9.81)
+    vector = BodyOptions(gravity="1,2,-3.5")
+    assert chosen_scene("slab", TissueOptions(body=vector)).world.free_fall == (1.0, 2.0, -3.5)
+    assert changed_by("world.gravity=[0, 0, 9]").world.free_fall == (0.0, 0.0, 9.0)
+    for text, why in (("1,2", "a vector of three"), ("-9.81", "0 or more"), ("x", "is 'x'; write")):
+        with pytest.raises(UsageError, match=why):
+            chosen_scene("slab", TissueOptions(body=BodyOptions(gravity=text)))
+    with pytest.raises(UsageError, match="gravity is 200 m/s2; it must be at most 100"):
+        changed_by("world.gravity=[0, 200, 0]")
+
+
 def test_a_value_is_one_of_toml_or_a_text():
     scene = changed_by("material.toughness=5", "body.fixed=bottom", "solver.audit=true")
     assert (scene.material.toughness, scene.body.fixed, scene.solver.audit) == (5.0, "bottom", True)
