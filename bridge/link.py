@@ -22,6 +22,7 @@ from tissue import (
     BladeSweep,
     Chunks,
     CutReport,
+    Deformation,
     FloatArray,
     Geom,
     Material,
@@ -161,6 +162,9 @@ class TissueLink(Protocol):
     def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
         """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
 
+    def deformation(self) -> Deformation:
+        """Return stress and strain of each tetrahedron now."""
+
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
 
@@ -287,6 +291,10 @@ class InProcessLink:
     def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
         """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
         return self._tissue.surface_values(quantity)
+
+    def deformation(self) -> Deformation:
+        """Return stress and strain of each tetrahedron now."""
+        return self._tissue.deformation()
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""

@@ -68,6 +68,7 @@ from .types import SKIN_COLOUR as SKIN_COLOUR
 from .types import AddedMass as AddedMass
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
+from .types import Deformation as Deformation
 from .types import Energies as Energies
 from .types import Piece as Piece
 from .types import RigidContacts as RigidContacts
@@ -93,6 +94,7 @@ __all__ = [
     "CutReport",
     "CutSettings",
     "DAMPING_BAND",
+    "Deformation",
     "Energies",
     "FloatArray",
     "Geom",

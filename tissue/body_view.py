@@ -1,18 +1,23 @@
 """Views of a body: copies of its state, its pieces, the boxes around it, quantities at its skin."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import get_args
 
 import numpy as np
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.elasticity.internal_forces import Elastic
 from tissue.fields.node_fields import largest_principal_strains, von_mises_stresses
+from tissue.fields.tetrahedron_fields import strains_of_tetrahedra, stresses_of_tetrahedra
+from tissue.integrators.model import TissueModel
+from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.pieces import label_pieces
-from tissue.mesh.surface import boundary_nodes
-from tissue.types import Chunks, Snapshot, SurfaceQuantity
+from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
+from tissue.mesh.surface import boundary_nodes, boundary_surface
+from tissue.types import Chunks, Deformation, Piece, Snapshot, Surface, SurfaceQuantity
 
 
 def bounds_of_body(body: Body) -> FloatArray:
@@ -82,14 +87,101 @@ def surface_values_of(body: Body, elastic: Elastic, quantity: SurfaceQuantity) -
     if quantity == "strain":
         largest_principal_strains(body, sums, values)
     elif quantity == "stress":
-        # What the last step left is for the bound before the next one.
-        left = elastic.solid.gradient, elastic.solid.stiffness_taken
-        kept = [array.copy() for array in left]
-        von_mises_stresses(elastic, body, sums, values)
-        for array, values_before in zip(left, kept, strict=True):
-            array[:] = values_before
+        with _as_before(elastic):
+            von_mises_stresses(elastic, body, sums, values)
     else:
         raise ValueError(
             f"there is no quantity {quantity!r}. Known: {', '.join(get_args(SurfaceQuantity))}"
         )
     return values[nodes]
+
+
+@contextmanager
+def _as_before(elastic: Elastic) -> Iterator[None]:
+    """Put back what the last step left for the bound before the next one."""
+    left = elastic.solid.gradient, elastic.solid.stiffness_taken
+    kept = [array.copy() for array in left]
+    yield
+    for array, values_before in zip(left, kept, strict=True):
+        array[:] = values_before
+
+
+def deformation_of(body: Body, elastic: Elastic, spring_modulus: float) -> Deformation:
+    """Return stress and strain of each tetrahedron.
+
+    Args:
+        body: The body.
+        elastic: Arrays from which the stress follows.
+        spring_modulus: Young's modulus in van Gelder's formula [Pa], where there are springs.
+    """
+    stresses, strains = np.zeros((2, body.n_tetrahedra, 3, 3))
+    with _as_before(elastic):
+        stresses_of_tetrahedra(elastic, body, spring_modulus, stresses)
+    strains_of_tetrahedra(body, strains)
+    return Deformation(stresses, strains)
+
+
+class BodyView:
+    """What there is to read of the body of a `Tissue`."""
+
+    material: Material
+    """What the body is made of."""
+    _model: TissueModel
+
+    @property
+    def _body(self) -> Body:
+        return self._model.body
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return self._model.body.n_nodes
+
+    @property
+    def n_tetrahedra(self) -> int:
+        """Number of tetrahedra."""
+        return self._model.body.n_tetrahedra
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the body [m], shape (2, 3)."""
+        return bounds_of_body(self._body)
+
+    def snapshot(self) -> Snapshot:
+        """Return a copy of the whole state."""
+        return snapshot_of(self._body)
+
+    def surface(self) -> Surface:
+        """Return the boundary triangles, skin and cut faces apart."""
+        return boundary_surface(self._body)
+
+    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
+        """Return a quantity at each vertex of `surface()`, shape (n_vertices,).
+
+        `displacement`: distance from rest [m]. `strain`: largest principal Green-Lagrange strain,
+        (l^2 - 1) / 2 where the most stretched direction is l times as long. `stress`: equivalent
+        stress of von Mises of the elastic Cauchy stress [Pa], under any law, less what has relaxed.
+        Strain and stress are the mean of the tetrahedra around the node, by volume: those of
+        `deformation`.
+
+        Raises:
+            ValueError: there is no such quantity.
+        """
+        return surface_values_of(self._body, self._model.elasticity.arrays, quantity)
+
+    def deformation(self) -> Deformation:
+        """Return stress and strain of each tetrahedron now."""
+        modulus = self.material.spring_modulus
+        return deformation_of(self._body, self._model.elasticity.arrays, modulus)
+
+    def n_pieces(self) -> int:
+        """Return the number of connected pieces."""
+        return n_pieces_of(self._body)
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return the connected pieces and their mass properties, the largest at rest first."""
+        return pieces_of(self.snapshot())
+
+    def piece_of_tetrahedra(self) -> IntArray:
+        """Return the index in `pieces` of the piece of each tetrahedron, shape (n_tets,)."""
+        return piece_of_tetrahedra(self.snapshot())

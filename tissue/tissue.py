@@ -7,10 +7,10 @@ import numpy.typing as npt
 
 from tissue.blade.prescribed_cut import checked_edges
 from tissue.blade_shape import BladeShape
-from tissue.body_view import bounds_of_body, n_pieces_of, snapshot_of, surface_values_of
+from tissue.body_view import BodyView
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact
-from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.memento import Spares
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
@@ -18,28 +18,16 @@ from tissue.loads.attachment import Attachment, Ligament, ends_of_fibres
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints, points_of
 from tissue.material import Material
-from tissue.mesh.body import Body
-from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
-from tissue.mesh.surface import boundary_surface
 from tissue.solver_settings import SolverSettings
 from tissue.state.identity import Identity
 from tissue.state.tissue_state import Around, TissueState
 from tissue.stepping.acting_forces import ActingForce, acting_forces
 from tissue.stepping.assembly import assembled
 from tissue.stepping.checked_steps import CheckedSteps
-from tissue.types import (
-    Chunks,
-    Piece,
-    SchemeStatistics,
-    Snapshot,
-    StepResult,
-    Surface,
-    SurfaceQuantity,
-    TetrahedralMesh,
-)
+from tissue.types import Chunks, SchemeStatistics, StepResult, TetrahedralMesh
 
 
-class Tissue:
+class Tissue(BodyView):
     """A soft body of tetrahedra: masses at nodes, a material between them, a blade that cuts it.
 
     Args:
@@ -79,10 +67,6 @@ class Tissue:
         """Mean node size of the body before any cut [m]."""
         self._identity = Identity.of(model.body, model.surroundings.gravity, *settings)
         self._spares = Spares()
-
-    @property
-    def _body(self) -> Body:
-        return self._model.body
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Advance the body by `dt` [s] while the blade does `sweep`.
@@ -304,57 +288,9 @@ class Tissue:
         """Return each force from outside on the body in the last step, those of the blade first."""
         return acting_forces(self._stages)
 
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes."""
-        return self._model.body.n_nodes
-
-    @property
-    def n_tetrahedra(self) -> int:
-        """Number of tetrahedra."""
-        return self._model.body.n_tetrahedra
-
-    @property
-    def bounds(self) -> FloatArray:
-        """Lowest and highest corner of the body [m], shape (2, 3)."""
-        return bounds_of_body(self._body)
-
-    def snapshot(self) -> Snapshot:
-        """Return a copy of the whole state."""
-        return snapshot_of(self._body)
-
-    def surface(self) -> Surface:
-        """Return the boundary triangles, skin and cut faces apart."""
-        return boundary_surface(self._body)
-
-    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
-        """Return a quantity at each vertex of `surface()`, shape (n_vertices,).
-
-        `displacement`: distance from rest [m]. `strain`: largest principal Green-Lagrange strain,
-        (l^2 - 1) / 2 where the most stretched direction is l times as long. `stress`: equivalent
-        stress of von Mises of the elastic Cauchy stress [Pa], under any law, less what has relaxed.
-        Strain and stress are the mean of the tetrahedra around the node, by volume.
-
-        Raises:
-            ValueError: there is no such quantity.
-        """
-        return surface_values_of(self._body, self._model.elasticity.arrays, quantity)
-
     def chunks(self) -> Chunks:
         """Return boxes that hold the body and its ligaments: a blade outside touches nothing."""
         return self._stages.chunks_now()
-
-    def n_pieces(self) -> int:
-        """Return the number of connected pieces."""
-        return n_pieces_of(self._body)
-
-    def pieces(self) -> tuple[Piece, ...]:
-        """Return the connected pieces and their mass properties, the largest at rest first."""
-        return pieces_of(self.snapshot())
-
-    def piece_of_tetrahedra(self) -> IntArray:
-        """Return the index in `pieces` of the piece of each tetrahedron, shape (n_tets,)."""
-        return piece_of_tetrahedra(self.snapshot())
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and what they did to elements and time step."""

@@ -273,6 +273,25 @@ class Snapshot(NamedTuple):
     """Whether each node is fixed, shape (n_nodes,)."""
 
 
+class Deformation(NamedTuple):
+    """Stress and strain of each tetrahedron. Copies."""
+
+    stress: FloatArray
+    """Elastic Cauchy stress [Pa], shape (n_tets, 3, 3), less what has relaxed, pull positive: that
+    of which the forces on the corners are made (`tissue.fields.tetrahedron_fields`). A row is a
+    component of the force, a column one of the normal. Of shear that is averaged around nodes it is
+    symmetric in the sum over tetrahedra, and in each of them as far as the strain is even."""
+    strain: FloatArray
+    """Green-Lagrange strain, (F^T F - 1) / 2, of the axes of the body at rest, same shape."""
+
+    def von_mises(self) -> FloatArray:
+        """Return the equivalent stress of von Mises [Pa], shape (n_tets,)."""
+        symmetric = 0.5 * (self.stress + self.stress.swapaxes(1, 2))
+        pressure = np.trace(symmetric, axis1=1, axis2=2) / 3.0
+        deviator = symmetric - pressure[:, None, None] * np.eye(3)
+        return np.asarray(np.sqrt(1.5 * (deviator * deviator).sum(axis=(1, 2))))
+
+
 class Surface(NamedTuple):
     """The boundary triangles of the body: its skin and the faces that the blade made. Copies."""
 

@@ -20,12 +20,14 @@ from bridge.tcp.connection import ANSWER_SECONDS, Connection, Served
 from bridge.tcp.messages.body import (
     CHUNKS,
     CUT_REPORT,
+    DEFORMATION,
     LARGEST_CHUNKS,
     PIECES,
     QUANTITY,
     SNAPSHOT,
     SURFACE,
     VALUES,
+    deformation_bytes,
     snapshot_bytes,
     surface_bytes,
     values_bytes,
@@ -48,6 +50,7 @@ from tissue import (
     BladeSweep,
     Chunks,
     CutReport,
+    Deformation,
     FloatArray,
     Geom,
     Snapshot,
@@ -191,6 +194,11 @@ class TcpLink:
         """Return the boundary triangles, for a picture."""
         limit = surface_bytes(self._n_tetrahedra)
         return self._connection.request(MessageKind.SURFACE, b"", limit, SURFACE.unpack)
+
+    def deformation(self) -> Deformation:
+        """Return stress and strain of each tetrahedron now."""
+        limit = deformation_bytes(self._n_tetrahedra)
+        return self._connection.request(MessageKind.DEFORMATION, b"", limit, DEFORMATION.unpack)
 
     def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
         """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""

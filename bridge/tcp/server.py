@@ -17,6 +17,7 @@ from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
 from bridge.tcp.messages.body import (
     CHUNKS,
     CUT_REPORT,
+    DEFORMATION,
     PIECES,
     QUANTITY,
     SNAPSHOT,
@@ -46,6 +47,7 @@ _logger = logging.getLogger(__name__)
 _QUERIES: dict[int, Callable[[InProcessLink], bytes]] = {
     MessageKind.HELLO: lambda link: DESCRIPTION.pack(link.describe()),
     MessageKind.SNAPSHOT: lambda link: SNAPSHOT.pack(link.snapshot()),
+    MessageKind.DEFORMATION: lambda link: DEFORMATION.pack(link.deformation()),
     MessageKind.SURFACE: lambda link: SURFACE.pack(link.surface()),
     MessageKind.FRAMES: lambda link: LOADS.pack(link.loads()),
     MessageKind.CHUNKS: lambda link: CHUNKS.pack(link.chunks()),

@@ -17,11 +17,11 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-PROTOCOL_VERSION = 9
+PROTOCOL_VERSION = 10
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
 contacts and energies of a step; 6 added driven frames; 7 added driven geoms
 and ties; 8 added values at the surface; 9 made contents
-MessagePack."""
+MessagePack; 10 added stress and strain of tetrahedra."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be kept before it can be checked. A step request
@@ -62,6 +62,7 @@ class MessageKind(enum.IntEnum):
     SERVO = 16
     MEASURED = 17
     END = 18
+    DEFORMATION = 19
 
 
 class Frame(NamedTuple):

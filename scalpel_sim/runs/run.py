@@ -202,7 +202,7 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
         hand.take_over(simulation)
     if outputs.resumption is not None:
         outputs.resumption.load_into(simulation)
-        outputs.write_mesh(INITIAL, run.first)  # its size is that of the space that is kept
+        outputs.write_mesh(INITIAL, run.first, run.first_deformation)  # its size: the space kept
         outputs.keep_reserve()
         outputs.remove_earlier_files()
     if scene is not None and hand is not None:
@@ -215,7 +215,7 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
     plan = RunPlan(simulation.dt, text, exports, run.settings, seconds, read)
     outputs.begin_journal(plan)
     if outputs.resumption is None:
-        outputs.write_mesh(INITIAL, run.first)
+        outputs.write_mesh(INITIAL, run.first, run.first_deformation)
         outputs.keep_reserve()
     return plan
 

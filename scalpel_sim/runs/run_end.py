@@ -28,7 +28,7 @@ from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.pictures import add_to
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import Snapshot
+from tissue import Deformation, Snapshot
 
 _log = logging.getLogger(__name__)
 
@@ -84,6 +84,8 @@ class OpenRun:
         """Heading of the plots."""
         self.first: Snapshot = link.snapshot()
         """The body before the first frame."""
+        self.first_deformation: Deformation = link.deformation()
+        """Its stress and strain then."""
         self.status = COMPLETE
         """`complete`, or what ended the run before its time."""
         self.failure: Exception | None = None
@@ -154,8 +156,9 @@ def _outcome(run: OpenRun) -> RunOutcome:
     """Write the final mesh, and return the outcome of the run."""
     last = report = None
     with run.attempts.of(FINAL):
-        last = run.simulation.link.snapshot()
-        run.outputs.write_mesh(FINAL, last)
+        link = run.simulation.link
+        last = link.snapshot()
+        run.outputs.write_mesh(FINAL, last, link.deformation())
     if FINAL not in run.attempts.unwritten:
         with run.attempts.of("the quality of the cut"):
             report = run.simulation.link.cut_report()

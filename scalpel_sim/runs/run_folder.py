@@ -33,7 +33,7 @@ from scalpel_sim.runs.file_names import (
 from scalpel_sim.runs.resumption import Resumption
 from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import Snapshot, write_vtu
+from tissue import Deformation, Snapshot, write_vtu
 from tissue.support import remove_unfinished, whole_file
 
 FRAMES_PER_FLUSH = 25
@@ -146,10 +146,10 @@ class Outputs:
         """Write `scene.toml`."""
         self._write_whole(SCENE, lambda path: path.write_text(text, encoding="utf-8"))
 
-    def write_mesh(self, name: str, snapshot: Snapshot) -> None:
-        """Write the body as `initial.vtu` or `final.vtu`."""
+    def write_mesh(self, name: str, snapshot: Snapshot, deformation: Deformation) -> None:
+        """Write the body as `initial.vtu` or `final.vtu`, with its stress and strain."""
         with writing(self.path(name), _INSTEAD):
-            write_vtu(self.path(name), snapshot)
+            write_vtu(self.path(name), snapshot, deformation)
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""

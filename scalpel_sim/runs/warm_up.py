@@ -270,6 +270,7 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     tissue.surface()
     tissue.surface_values("strain")
     tissue.surface_values("stress")
+    tissue.deformation()
     tissue.snapshot()
     tissue.n_pieces()
     tissue.cut_report()

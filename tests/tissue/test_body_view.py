@@ -148,6 +148,7 @@ def test_looking_changes_no_bit_of_a_cut(relaxation, law, precision):
             tissue.step(BladeSweep(edge(i), edge(i + 1)), 1e-3)
             if looks:
                 values = tissue.surface_values("stress"), tissue.surface_values("strain")
+                assert len(tissue.deformation().strain) == tissue.n_tetrahedra
                 assert all(len(each) == len(tissue.surface().positions) for each in values)
         return tissue.snapshot()
 

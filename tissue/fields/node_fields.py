@@ -1,28 +1,17 @@
 """Strain and Cauchy stress of the body, averaged at its nodes.
 
-The Green-Lagrange strain
-
-    E = (F^T F - 1) / 2 = (H + H^T + H^T H) / 2        H = F - 1
-
-is constant in a tetrahedron. A node has the mean of the tetrahedra around it, by volume at rest.
-
-The stress follows from the very forces that move the body. The elastic forces f_k on the corners
-x_k of a tetrahedron of volume v, and the pull p of a spring along d, are those of a mean stress
-(the virial; Tsai 1979, J. Chem. Phys. 70:1375)
-
-    v sigma = - sum of f_k (x_k - x_0)^T        v sigma = p d d^T / |d|
-
-For linear tetrahedra the first is exact, sigma = P F^T / J, whatever the law, with what has
-relaxed and what averaged volumes add. A node has half of each spring and a quarter of each
-tetrahedron, of which its stress is the mean by present volume. Viscous stress is not in it.
+They are those of tetrahedra (`tissue.fields.tetrahedron_fields`). A node has the mean strain of the
+tetrahedra around it, by volume at rest; and of the virial of forces half of each spring and a
+quarter of each tetrahedron, of which its stress is the mean by present volume.
 """
 
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, dot, norm, sub, vec3
-from tissue.elasticity.finite_elements import corner_row, rest_normals
+from tissue.core.vec3 import Vec3, norm, sub, vec3
+from tissue.elasticity.finite_elements import corner_row
 from tissue.elasticity.internal_forces import Elastic, deform
 from tissue.elasticity.springs import NO_LENGTH
+from tissue.fields.tetrahedron_fields import green_lagrange
 from tissue.geometry.tetrahedron import Symmetric, largest_eigenvalue, tetrahedron_volume
 from tissue.mesh.body import Body
 
@@ -37,7 +26,7 @@ def largest_principal_strains(body: Body, sums: FloatArray, strains: FloatArray)
         strains: Written, shape (n_nodes,).
     """
     for t in range(body.n_tetrahedra):
-        strain, volume = _strain(body, t)
+        strain, volume = green_lagrange(body, t)
         for k in range(4):
             node = body.tetrahedra[t, k]
             sums[node, 0] += volume * strain.xx
@@ -59,44 +48,6 @@ def largest_principal_strains(body: Body, sums: FloatArray, strains: FloatArray)
                 per * sums[node, 5],
             )
         )
-
-
-@kernel
-def _strain(body: Body, t: int) -> tuple[Symmetric, float]:
-    """Return E of a tetrahedron, and its volume at rest [m3]."""
-    n1, n2, n3, volume = rest_normals(body, t)
-    d0 = _displacement(body, body.tetrahedra[t, 0])
-    d1 = sub(_displacement(body, body.tetrahedra[t, 1]), d0)
-    d2 = sub(_displacement(body, body.tetrahedra[t, 2]), d0)
-    d3 = sub(_displacement(body, body.tetrahedra[t, 3]), d0)
-    per = 1.0 / (6.0 * volume)
-    # Columns of H: displacements per length along x, y and z.
-    x = _column(per, d1, d2, d3, n1.x, n2.x, n3.x)
-    y = _column(per, d1, d2, d3, n1.y, n2.y, n3.y)
-    z = _column(per, d1, d2, d3, n1.z, n2.z, n3.z)
-    strain = Symmetric(
-        x.x + 0.5 * dot(x, x),
-        y.y + 0.5 * dot(y, y),
-        z.z + 0.5 * dot(z, z),
-        0.5 * (x.y + y.x + dot(x, y)),
-        0.5 * (x.z + z.x + dot(x, z)),
-        0.5 * (y.z + z.y + dot(y, z)),
-    )
-    return strain, volume
-
-
-@kernel
-def _displacement(body: Body, node: int) -> Vec3:
-    return sub(vec3(body.positions, node), vec3(body.rest, node))
-
-
-@kernel
-def _column(per: float, d1: Vec3, d2: Vec3, d3: Vec3, n1: float, n2: float, n3: float) -> Vec3:
-    return Vec3(
-        per * (n1 * d1.x + n2 * d2.x + n3 * d3.x),
-        per * (n1 * d1.y + n2 * d2.y + n3 * d3.y),
-        per * (n1 * d1.z + n2 * d2.z + n3 * d3.z),
-    )
 
 
 @kernel

@@ -12,15 +12,17 @@ import numpy.typing as npt
 from tissue.io.whole_file import whole_file
 from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.mesh.pieces import piece_of_tetrahedra
-from tissue.types import Snapshot, TetrahedralMesh
+from tissue.types import Deformation, Snapshot, TetrahedralMesh
 
 VTK_TETRA = 10
 """VTK's number for a tetrahedron with four nodes."""
 
-_TYPE_NAMES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
+_TYPE_NAMES = {"f4": "Float32", "f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
-def write_vtu(path: str | os.PathLike[str], snapshot: Snapshot) -> None:
+def write_vtu(
+    path: str | os.PathLike[str], snapshot: Snapshot, deformation: Deformation | None = None
+) -> None:
     """Write `snapshot` to `path`.
 
     The points are the current positions [m]; the point data are `rest_position` [m],
@@ -28,18 +30,30 @@ def write_vtu(path: str | os.PathLike[str], snapshot: Snapshot) -> None:
     piece that a tetrahedron is in, 0 for the largest. Numbers keep all their bits. The file
     appears under its name only when it is complete, so an interrupted write leaves the old one.
 
+    Args:
+        path: The file.
+        snapshot: The body.
+        deformation: Its stress and strain, which are cell data then, in single precision: `stress`
+            [Pa] and `strain`, nine components row by row, and `von_mises` [Pa]. None: none is.
+
     Raises:
         MeshError: Positions or tetrahedra have another shape or hold no numbers.
+        ValueError: Stress and strain are of other tetrahedra.
         OSError: The file cannot be written.
     """
     mesh = mesh_arrays(TetrahedralMesh(snapshot.positions, snapshot.tetrahedra))
     snapshot = snapshot._replace(positions=mesh.positions, tetrahedra=mesh.tetrahedra)
+    n_given = len(mesh.tetrahedra) if deformation is None else len(deformation.stress)
+    if n_given != len(mesh.tetrahedra):
+        raise ValueError(
+            f"the stress is that of {n_given} tetrahedra, and the body has {len(mesh.tetrahedra)}"
+        )
     with whole_file(path) as unfinished, unfinished.open("wb") as file:
-        for line in _lines(snapshot):
+        for line in _lines(snapshot, deformation):
             file.write(line.encode("ascii") + b"\n")
 
 
-def _lines(snapshot: Snapshot) -> Iterator[str]:
+def _lines(snapshot: Snapshot, deformation: Deformation | None) -> Iterator[str]:
     """Yield the lines of the file."""
     n_tets = len(snapshot.tetrahedra)
     byte_order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
@@ -66,6 +80,10 @@ def _lines(snapshot: Snapshot) -> Iterator[str]:
     yield "</PointData>"
     yield "<CellData>"
     yield from _data_array("piece", piece_of_tetrahedra(snapshot), "i8")
+    if deformation is not None:
+        yield from _data_array("stress", deformation.stress.reshape(-1, 9), "f4")
+        yield from _data_array("strain", deformation.strain.reshape(-1, 9), "f4")
+        yield from _data_array("von_mises", deformation.von_mises(), "f4")
     yield "</CellData>"
     yield "</Piece>"
     yield "</UnstructuredGrid>"

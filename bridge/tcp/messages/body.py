@@ -18,6 +18,7 @@ from bridge.tcp.wire import LARGEST_FRAME, MessageError
 from tissue import (
     Chunks,
     CutReport,
+    Deformation,
     FloatArray,
     IntArray,
     MeshMeasures,
@@ -42,6 +43,11 @@ _Natural = Annotated[float, msgspec.Meta(ge=0.0)]
 def snapshot_bytes(n_nodes: int, n_tetrahedra: int) -> int:
     """Return the largest length of a snapshot [byte]."""
     return MAP_BYTES + n_nodes * _NODE_BYTES + n_tetrahedra * _TETRAHEDRON_BYTES
+
+
+def deformation_bytes(n_tetrahedra: int) -> int:
+    """Return the largest length of the stress and strain of tetrahedra [byte]."""
+    return MAP_BYTES + 2 * 9 * 8 * n_tetrahedra
 
 
 def surface_bytes(n_tetrahedra: int) -> int:
@@ -107,6 +113,13 @@ SNAPSHOT: Message[Snapshot] = Message(
     _check_snapshot,
 )
 """The reply with the state of the whole body."""
+
+DEFORMATION: Message[Deformation] = Message(
+    Record(Deformation, stress=("tetrahedra", 3, 3), strain=("tetrahedra", 3, 3)),
+    "stress and strain",
+    lambda deformation: expect_finite(*deformation),
+)
+"""The reply with stress and strain of each tetrahedron."""
 
 SURFACE: Message[Surface] = Message(
     Record(

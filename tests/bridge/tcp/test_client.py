@@ -65,6 +65,8 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
         values = link.surface_values(quantity)
         assert bits(here.surface_values(quantity)) == bits(values)
         assert len(values) == len(link.surface().positions) and values.max() > 0.0
+    assert bits(here.deformation()) == bits(link.deformation())
+    assert np.abs(link.deformation().stress).max() > 0.0
     assert bits(here.chunks()) == bits(link.chunks())
     assert here.n_pieces() == link.n_pieces()
     assert bits(here.cut_report()) == bits(link.cut_report())
@@ -117,7 +119,7 @@ def test_what_the_tissue_refuses_is_a_refused_request(link, upright):
         (bytes(100), "is not scalpel-sim"),
         (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
-        (HELLO[:4] + b"\x08\x00" + HELLO[6:], "uses version 8 of the protocol and this one 9"),
+        (HELLO[:4] + b"\x09\x00" + HELLO[6:], "uses version 9 of the protocol and this one 10"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
         (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],

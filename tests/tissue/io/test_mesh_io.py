@@ -8,7 +8,7 @@ import pytest
 from tests.support import bodies
 from tests.tissue.io import mesh_writers
 from tests.tissue.io import mesh_writers as write
-from tissue import Snapshot, TetrahedralMesh, block, read_mesh, write_vtu
+from tissue import Snapshot, TetrahedralMesh, Tissue, block, read_mesh, write_vtu
 from tissue.boundary_conditions import side_nodes
 from tissue.io import mesh_io
 from tissue.io.mesh_io import renumbered
@@ -307,6 +307,24 @@ def test_the_cell_data_has_the_piece_of_each_tetrahedron(tmp_path):
     write_vtu(tmp_path / "body.vtu", body)
     (piece,) = meshio.read(tmp_path / "body.vtu").cell_data["piece"]
     assert piece.tolist() == [1] + [0] * len(BLOCK.tetrahedra)  # the largest at rest is 0
+
+
+def test_meshio_reads_the_stress_and_strain_of_each_tetrahedron(tmp_path):
+    at = BLOCK.positions * [1.2, 0.9, 1.0]
+    every = np.ones(len(at), dtype=bool)
+    tissue = Tissue(BLOCK, fixed=every, positions=at)
+    found = tissue.deformation()
+    write_vtu(tmp_path / "body.vtu", tissue.snapshot(), found)
+    cells = {name: data[0] for name, data in meshio.read(tmp_path / "body.vtu").cell_data.items()}
+    assert np.array_equal(cells["stress"].reshape(-1, 3, 3), found.stress.astype(np.float32))
+    assert cells["strain"].reshape(-1, 3, 3)[:, 0, 0] == pytest.approx(0.22, rel=1e-6)
+    assert np.array_equal(cells["von_mises"], found.von_mises().astype(np.float32))
+
+
+def test_stress_of_another_body_is_refused(tmp_path):
+    other = Tissue(block((1, 1, 1), (0.01, 0.01, 0.01))).deformation()
+    with pytest.raises(ValueError, match="the stress is that of 6 tetrahedra, and the body has"):
+        write_vtu(tmp_path / "body.vtu", snapshot(), other)
 
 
 def test_a_written_snapshot_is_read_as_a_mesh(tmp_path):

@@ -27,6 +27,7 @@ from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     CHUNKS,
     CUT_REPORT,
+    DEFORMATION,
     PIECES,
     QUANTITY,
     SNAPSHOT,
@@ -84,6 +85,7 @@ def real_messages():
             lambda payload: unpack_result(payload, 2),
         ),
         "snapshot": (SNAPSHOT.pack(tissue.snapshot()), SNAPSHOT.unpack),
+        "deformation": (DEFORMATION.pack(tissue.deformation()), DEFORMATION.unpack),
         "chunks": (CHUNKS.pack(tissue.chunks()), CHUNKS.unpack),
         "surface": (SURFACE.pack(tissue.surface()), SURFACE.unpack),
         "quantity": (QUANTITY.pack("strain"), QUANTITY.unpack),
@@ -114,6 +116,7 @@ IS_VALID = {
     "snapshot": lambda value: (
         0 <= value.tetrahedra.min() <= value.tetrahedra.max() < len(value.positions)
     ),
+    "deformation": lambda value: is_finite(*value) and value.stress.shape == value.strain.shape,
     "surface": lambda value: (
         0 <= value.triangles.min() <= value.triangles.max() < len(value.positions)
     ),
