@@ -226,55 +226,64 @@ def _fastest(rows: np.ndarray[Any, Any]) -> tuple[float, float]:
     return float(speeds.max()), float((2.0 * np.arcsin(chords) / steps).max())
 
 
-def lag(*scenes: str) -> BenchmarkResult:
+def lag(*scenes: str, width: int = 480, height: int = 360) -> BenchmarkResult:
     """Time from a movement of the mouse to the picture that contains it, in headless Chromium.
 
-    It draws by software: 480 x 360 pixels, a movement every 15 ms. Each lag ends when the browser
-    has drawn the picture.
+    It draws by software, and the mouse moves every 15 ms. Each lag ends when the picture is drawn.
 
     Args:
         scenes: Scenes [default: grid2, organ].
+        width: Width of the window [pixels].
+        height: Height of the window [pixels].
     """
     from tests.scalpel_sim.hands.driven_view import DrivenView
 
-    rows, paces = Rows("lag"), []
+    rows, notes = Rows("lag"), []
     for scene in scenes or ("grid2", "organ"):
         with tempfile.TemporaryDirectory() as folder, DrivenView(scene, Path(folder)) as view:
-            lags, pace = _lags_in(view.url)
+            lags, note = _lags_in(view.url, width, height)
         rows.times(scene, None, [lags], quantity="lag")
-        paces.append(f"{scene}: {pace}")
-    return rows.table("lag of the picture", "; ".join(paces))
+        notes.append(f"{scene}: {note}")
+    return rows.table("lag of the picture", "; ".join(notes))
 
 
-def _lags_in(url: str) -> tuple[FloatArray, str]:
-    """Return the lags [s], and the speed of the run as the page shows it."""
+_COUNT_PICTURES = """() => {
+    window.nPictures = 0;
+    window.since = performance.now();
+    const draw = viewer.handle_command_bytearray.bind(viewer);
+    viewer.handle_command_bytearray = (bytes) => { window.nPictures += 1; draw(bytes); };
+}"""
+
+
+def _lags_in(url: str, width: int, height: int) -> tuple[FloatArray, str]:
+    """Return the lags [s], and the pictures a second with the speed of the run, as a text."""
     from playwright.sync_api import sync_playwright
 
-    from tests.support.browser import DETERMINISTIC, NAMES, WINDOW, first_installed
+    from tests.support.browser import DETERMINISTIC, NAMES, first_installed
 
     with sync_playwright() as driver:
         chromium = driver.chromium.launch(
             executable_path=first_installed(NAMES), args=list(DETERMINISTIC)
         )
         # It waits for texts, which the policy of the page forbids to evaluate.
-        tab = chromium.new_page(
-            viewport={"width": WINDOW["width"], "height": WINDOW["height"]}, bypass_csp=True
-        )
+        tab = chromium.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
         tab.goto(url)
         tab.wait_for_function("hand.isClosed")
-        x, y = WINDOW["width"] / 2, 0.45 * WINDOW["height"]
+        x, y = width / 2, 0.45 * height
         tab.mouse.move(x, y)
         tab.mouse.down()
         for i in range(round(_SETTLING / _SECONDS_PER_MOVE)):
             tab.mouse.move(x + i % 3, y)
             time.sleep(_SECONDS_PER_MOVE)
         tab.evaluate("hand.lags.length = 0")
+        tab.evaluate(_COUNT_PICTURES)
         for i in range(_N_MOVES):
             drawn = 60.0 * (i % 100) / 100.0
             tab.mouse.move(x + drawn, y + drawn)
             time.sleep(_SECONDS_PER_MOVE)
+        rate = tab.evaluate("1000 * nPictures / (performance.now() - since)")
         tab.wait_for_function("hand.unshown.length === 0")
         found, pace = 1e-3 * np.array(tab.evaluate("hand.lags")), tab.inner_text("#pace")
         tab.close()
         chromium.close()
-    return found, str(pace)
+    return found, f"{rate:.1f} pictures a second, {pace}"

@@ -19,8 +19,13 @@ _HERE = Path(__file__).parent
 _BUNDLE = Path("viewer", "dist", "main.min.js")
 """Path of the JavaScript bundle of meshcat's viewer inside the Python package meshcat."""
 _OF_ALL_PAGES = (
+    "renderer.js",
+    "lights.js",
+    "materials.js",
+    "force_marks.js",
     "field_colours.js",
     "scene_view.js",
+    "coarseness.js",
     "controls.js",
     "looks.js",
     "picture.js",
@@ -73,7 +78,6 @@ def live_page(
     if is_led:
         bars.insert(0, "hand")
         scripts += [
-            "coarseness.js",
             "depth.js",
             "hand_input.js",
             "gamepad.js",

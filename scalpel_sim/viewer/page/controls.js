@@ -64,6 +64,7 @@ function chooseCamera(number) {
 
 const sceneView = new SceneView(element("meshcat-pane"), showReadings, offerCameras);
 window.viewer = sceneView.viewer; // the name that meshcat's own page uses
+const coarseness = new Coarseness(sceneView);
 
 function setWireframe(on) {
     element("wireframe").checked = on;

@@ -23,7 +23,6 @@ class Hand {
         this.isAtRest = true; // whether it was there in the picture before
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
         this.lags = [];
-        this.coarseness = new Coarseness(view);
         this.depth = new Depth(view);
         view.onHand = (state) => this.show(state);
         run.onChange = () => this.onRunChange();
@@ -76,7 +75,7 @@ class Hand {
         this.holders.set(holder, isStep ? performance.now() : Infinity);
         if (!this.isEngaged) this.run.say({ type: "engage" });
         this.isEngaged = true;
-        this.coarseness.setLed(true);
+        coarseness.isLed = true;
     }
 
     letGo(holder) {
@@ -84,7 +83,7 @@ class Hand {
         if (!this.isEngaged || this.holders.size > 0) return;
         this.run.say({ type: "release" });
         this.isEngaged = false;
-        this.coarseness.setLed(false);
+        coarseness.isLed = false;
     }
 
     letGoOfSteps() {

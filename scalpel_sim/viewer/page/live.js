@@ -2,19 +2,6 @@
 "use strict";
 
 const RETRY_AFTER = 2000; // time between attempts to reach the next run [ms]
-const LONGEST_DRAWING = 500; // [ms]: a tab that is hidden draws nothing
-
-// Call back once what was changed is on the screen: if another picture is requested before, a page that draws
-// slowly would decode many that it never shows.
-function afterDrawing(callback) {
-    let isDone = false;
-    const once = () => {
-        if (!isDone) callback();
-        isDone = true;
-    };
-    requestAnimationFrame(() => setTimeout(once));
-    setTimeout(once, LONGEST_DRAWING);
-}
 
 // Where the page controls the run, and leads its blade: see run.js and hand.js.
 const run = typeof Run === "undefined" ? null : new Run(sceneView);
@@ -51,11 +38,11 @@ function follow() {
             else run.onLeading(said);
             return;
         }
-        const since = performance.now();
+        coarseness.onChange();
         viewer.handle_command_bytearray(new Uint8Array(message.data));
         element("wireframe").checked = sceneView.wireframe;
-        afterDrawing(() => {
-            if (hand) hand.coarseness.note(performance.now() - since);
+        afterDrawing((duration) => {
+            coarseness.note(duration);
             if (socket.readyState === WebSocket.OPEN) socket.send("drawn");
         });
     };

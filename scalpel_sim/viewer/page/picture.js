@@ -23,14 +23,6 @@ function drawPicture() {
     const scale = canvas.width / renderer.domElement.clientWidth;
     const width = canvas.width / scale, height = canvas.height / scale;
     context.scale(scale, scale);
-    const shade = context.createRadialGradient(
-        width / 2, 0.38 * height, 0, width / 2, 0.38 * height, Math.hypot(width, height) / 1.6,
-    );
-    for (const [at, colour] of [[0, "#f4f7f7"], [0.45, "#dfe7e8"], [1, "#b9c7ca"]]) {
-        shade.addColorStop(at, colour);
-    }
-    context.fillStyle = shade;
-    context.fillRect(0, 0, width, height);
     renderer.render(scene, camera); // the canvas forgets its pixels once they are on the screen
     context.drawImage(renderer.domElement, 0, 0, width, height);
     drawTexts(context, MARGIN, MARGIN, [[document.title, ""]]);

@@ -64,8 +64,10 @@ class Player {
         while (frame + 1 < this.times.length && this.times[frame + 1] - this.first <= now + 1e-9) frame += 1;
         if (frame === this.shown) return;
         this.shown = frame;
+        coarseness.onChange();
         viewer.handle_command(this.frames[frame]);
         chart.mark(frame);
+        afterDrawing((duration) => coarseness.note(duration));
     }
 }
 

@@ -141,21 +141,6 @@ def test_a_mouse_cuts_the_organ_in_two_and_a_run_of_the_record_has_the_same_bits
 
 @pytest.mark.browser
 @pytest.mark.parametrize("view", ["grid2"], indirect=True)
-def test_a_picture_that_takes_long_is_coarse_while_the_blade_is_led_and_fine_at_rest(view, browser):
-    tab = opened(browser, view)
-    drawn = "[sceneView.lamp.castShadow, viewer.renderer.getPixelRatio()]"
-    assert tab.evaluate(drawn) == [True, 1]
-    tab.evaluate("hand.coarseness.setLed(true)")
-    for _ in range(3 * 4):
-        tab.evaluate("hand.coarseness.note(100)")
-    assert tab.evaluate(drawn) == [False, 0.4]
-    tab.evaluate("hand.coarseness.setLed(false)")
-    tab.wait_for_function(f"String({drawn}) === 'true,1'")
-    assert tab.failures == []
-
-
-@pytest.mark.browser
-@pytest.mark.parametrize("view", ["grid2"], indirect=True)
 def test_the_view_is_turned_by_the_right_button_by_ctrl_and_with_the_clutch_open(view, browser):
     tab = opened(browser, view)
 

@@ -1,0 +1,79 @@
+// The light of the scene: a lamp that casts shadows, a light on the rim, the sky, and what steel reflects.
+"use strict";
+
+// Wet tissue must shine without losing its colour, and a narrow cut must not be black.
+const LAMP = { colour: 0xfff1e0, intensity: 0.88 };
+const RIM = { colour: 0xbfd4ff, intensity: 0.35 };
+const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
+
+const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: filtering it makes the shadows soft
+
+class Lights {
+    constructor(scene) {
+        this.sky = new THREE.HemisphereLight(SKY.above, SKY.below, SKY.intensity);
+        this.lamp = new THREE.DirectionalLight(LAMP.colour, LAMP.intensity);
+        this.lamp.castShadow = true;
+        this.lamp.shadow.mapSize.set(SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS);
+        this.lamp.shadow.radius = 5;
+        this.rim = new THREE.DirectionalLight(RIM.colour, RIM.intensity);
+        scene.add(this.sky, this.lamp, this.lamp.target, this.rim, this.rim.target);
+    }
+
+    // The lamp hangs above and to the left of the camera; the rim light comes from behind the body. All are
+    // in the frame of the scene, in which z is up.
+    aim(target, eye, extent) {
+        const view = eye.clone().sub(target).setZ(0).normalize();
+        const left = new THREE.Vector3(view.y, -view.x, 0);
+        const up = new THREE.Vector3(0, 0, 1);
+        const offset = (a, b, c) => target.clone()
+            .addScaledVector(view, a * extent).addScaledVector(left, b * extent).addScaledVector(up, c * extent);
+        this.lamp.position.copy(offset(0.9, 0.9, 3.6));
+        this.rim.position.copy(offset(-2.5, -1.5, 1.8));
+        this.lamp.target.position.copy(target);
+        this.rim.target.position.copy(target);
+        const camera = this.lamp.shadow.camera;
+        Object.assign(camera, {
+            left: -2.2 * extent, right: 2.2 * extent, top: 2.2 * extent, bottom: -2.2 * extent,
+            near: 0.1 * extent, far: 8 * extent,
+        });
+        camera.updateProjectionMatrix();
+        this.lamp.shadow.bias = -0.0004;
+        this.lamp.shadow.normalBias = 0.003 * extent;
+    }
+}
+
+// The surroundings that steel and wet tissue reflect: a grey room with lamps under its ceiling. It is
+// drawn on six canvases, because filtering a rendered room takes seconds without a graphics card.
+function room() {
+    const size = 64;
+    const paint = (draw) => {
+        const canvas = document.createElement("canvas");
+        canvas.width = canvas.height = size;
+        draw(canvas.getContext("2d"));
+        return canvas;
+    };
+    const wall = paint((context) => {
+        const shade = context.createLinearGradient(0, 0, 0, size);
+        shade.addColorStop(0.0, "#dfe6e9");
+        shade.addColorStop(0.35, "#8b979c");
+        shade.addColorStop(0.55, "#4c5659");
+        shade.addColorStop(1.0, "#262c2f");
+        context.fillStyle = shade;
+        context.fillRect(0, 0, size, size);
+    });
+    const ceiling = paint((context) => {
+        context.fillStyle = "#7d888d";
+        context.fillRect(0, 0, size, size);
+        context.filter = "blur(3px)";
+        context.fillStyle = "#ffffff";
+        for (const [x, y] of [[10, 12], [38, 8], [24, 38]]) context.fillRect(x, y, 16, 16);
+    });
+    const floor = paint((context) => {
+        context.fillStyle = "#23292c";
+        context.fillRect(0, 0, size, size);
+    });
+    const texture = new THREE.CubeTexture([wall, wall, ceiling, floor, wall, wall]);
+    texture.encoding = THREE.sRGBEncoding;
+    texture.needsUpdate = true;
+    return texture;
+}
