@@ -30,13 +30,23 @@ ASSETS = Path(__file__).parent / "assets"
 ARMS = {
     "touch": DeviceLimits(force=3.3, torque=0.33),
     "premium": DeviceLimits(force=8.5, torque=0.188),
+    "psm": DeviceLimits(force=9.88, torque=0.2),
 }
-"""The arms, smallest first, and the largest force and torque that each can render.
+"""The arms, and the largest force and torque that each can render.
 
 Forces, and the torque of the Premium 1.5 with its six motors: CHAI3D, CPhantomDevices.cpp, after
 the vendor's data sheets. The gimbal of the Touch has no motors: the hand alone resists a torque, so
 no limit of the device belongs here. 0.33 N m is 3.3 N on a lever of 10 cm, the length of a scalpel.
+Those of the patient-side manipulator are what the motors of its insertion and of the yaw of its
+wrist exert, by the files that `psm.xml` names.
 """
+
+PSM = "psm"
+"""The patient-side manipulator, which works through a trocar: the origin of its base is its remote
+centre, not the middle of an underside."""
+
+CHOSEN_BY_SIZE = ("touch", "premium")
+"""Arms that `auto` chooses from, smallest first."""
 
 BLADE_HEIGHT, BLADE_THICKNESS, _STEEL = 6e-3, 0.4e-3, 7800.0
 """Height [m], thickness [m] and density [kg/m3] of a no. 11 scalpel blade."""
@@ -268,14 +278,14 @@ def _take_state(
 
 
 class Arm(DrivenArm):
-    """A PHANTOM-like arm, its blade, and the virtual hand that leads it. World frame.
+    """One of the project's arms, its blade, and the virtual hand that leads it. World frame.
 
     Args:
         preset: One of `ARMS`.
         blade_length: From heel to tip [m].
-        mount_angle: Between stylus and blade [rad]: at 0 the blade continues in the stylus's
-            direction, at pi/2 it points to the stylus's +z.
-        base_position: Middle of the base's underside [m].
+        mount_angle: Between stylus, or jaws, and blade [rad]: at 0 the blade continues in their
+            direction, at pi/2 it points to their +z.
+        base_position: Middle of the base's underside, or the remote centre [m].
         base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
         impedance: How firmly the hand holds the blade.
         others: What else stands in its world: arms, each with a grasper, a table, fixtures.
@@ -311,11 +321,11 @@ def preset_spec(preset: str) -> mujoco.MjSpec:
 
 
 def put_base(spec: mujoco.MjSpec, position: FloatArray, yaw: float) -> None:
-    """Move the arm, and add a column below a base that does not stand on the table."""
+    """Move the arm, and add a column below a base that should stand on the table and does not."""
     base = spec.body("base")
     base.pos = position
     base.quat = [math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)]
-    if position[2] > 0.0:
+    if position[2] > 0.0 and spec.modelname != PSM:
         base.add_geom(
             name="pedestal",
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,

@@ -26,6 +26,9 @@ _JAWS = ("jaw_low", "jaw_high")
 SHAFT_LENGTH = 0.0715
 """From where an arm holds it to the middle of the pads [m]."""
 
+SHORT_SHAFT = 0.025
+"""Likewise where it takes the place of jaws at the end of a shaft [m]: short enough for a wrist."""
+
 PAD_LENGTH = 0.015
 """Length of a pad, along the shaft [m]."""
 
@@ -91,7 +94,9 @@ def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> 
     return prefix
 
 
-def grasper_spec(spec: mujoco.MjSpec, force: float | None = None) -> mujoco.MjSpec:
+def grasper_spec(
+    spec: mujoco.MjSpec, force: float | None = None, length: float = SHAFT_LENGTH
+) -> mujoco.MjSpec:
     """Return a grasper, to be attached to a model with the prefix `GRASPER`.
 
     Its shaft points along +y.
@@ -99,9 +104,14 @@ def grasper_spec(spec: mujoco.MjSpec, force: float | None = None) -> mujoco.MjSp
     Args:
         spec: That model.
         force: Largest force of the jaws [N]; None: that of `grasper.xml`.
+        length: From where an arm holds it to the middle of the pads [m].
     """
     grasper = mujoco.MjSpec.from_file(str(_FILE))
     take_options(grasper, spec)
+    cut_off = SHAFT_LENGTH - length
+    grasper.body("shaft").pos = [0.0, -cut_off, 0.0]
+    shaft = grasper.geom("shaft")
+    shaft.fromto = shaft.fromto + np.array([0.0, cut_off, 0.0, 0.0, 0.0, 0.0])
     if force is not None:
         grasper.actuator("jaws").forcerange = [-force, force]
     return grasper

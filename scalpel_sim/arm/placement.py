@@ -2,25 +2,30 @@
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.arm.arm import ARMS, Arm
-from scalpel_sim.arm.inverse_kinematics import Geometry, geometry, reach
+from scalpel_sim.arm.arm import ARMS, CHOSEN_BY_SIZE, PSM, Arm
+from scalpel_sim.arm.firm_hand import firm_impedance
+from scalpel_sim.arm.hand import Impedance
+from scalpel_sim.arm.inverse_kinematics import TABLE_ROUNDING, geometry
+from scalpel_sim.arm.kinematics import TABLE_CLEARANCE, InstrumentPath, Kinematics, Spheres
 from scalpel_sim.arm.place_search import (
-    TABLE_CLEARANCE,
-    TABLE_ROUNDING,
     Found,
-    InstrumentPath,
-    Spheres,
-    base_of,
     blade_path,
     in_base,
     search_place,
     spheres_along,
     turn_about_z,
+)
+from scalpel_sim.arm.psm_kinematics import (
+    BASE_HEIGHT,
+    LEAST_DEPTH,
+    TROCAR_CLEARANCE,
+    WRIST_LEVER,
+    psm_geometry,
 )
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError, unknown
@@ -45,6 +50,10 @@ hand yields, and a joint that meets its stop would push back."""
 SMALLEST_SCALE, SCALE_HALVINGS = 1e-3, 7
 """Where an error message looks for the scale at which the arm would reach: from this up to 1, to
 6 %. A mesh in millimetres that is read as metres is a thousand times too large."""
+
+
+Trocar = tuple[float, float, float]
+"""Where a remote centre is to be, tissue frame [m]."""
 
 
 class PlacementError(UsageError):
@@ -74,13 +83,13 @@ class Placement(NamedTuple):
     mount_angle: float
     """Between stylus and blade [rad]."""
     base_position: FloatArray
-    """Middle of the base's underside [m], shape (3,)."""
+    """Middle of the base's underside, or the remote centre [m], shape (3,)."""
     base_yaw: float
     """Angle by which the base is turned about +z [rad]."""
     tissue_origin: FloatArray
     """Origin of the tissue frame, which is not turned [m], shape (3,)."""
     qpos: FloatArray
-    """Angles of the joints at the start of the stroke [rad], shape (6,)."""
+    """Positions of the joints at the start of the stroke [rad, m], shape (n_joints,)."""
     margin: float
     """Smallest distance of a joint from an end of its range along the stroke, as a fraction of half
     the range."""
@@ -93,20 +102,31 @@ class Placement(NamedTuple):
         Args:
             others: What else stands in its world: arms, each with a grasper, a table, fixtures.
         """
-        arm = Arm(
+        alike = partial(
+            Arm,
             self.preset,
             blade_length=self.blade_length,
             mount_angle=self.mount_angle,
             base_position=self.base_position,
             base_yaw=self.base_yaw,
-            others=others,
         )
+        impedance = Impedance()
+        if self.preset == PSM:
+            alone = alike()
+            alone.reset(self.qpos)
+            impedance = firm_impedance(alone, lever=WRIST_LEVER)
+        arm = alike(impedance=impedance, others=others)
         arm.reset(self.qpos)
         return arm
 
 
 def place(
-    stroke: Stroke, boxes: FloatArray, preset: str = AUTO, *, force: float = 0.0
+    stroke: Stroke,
+    boxes: FloatArray,
+    preset: str = AUTO,
+    *,
+    force: float = 0.0,
+    trocar: Trocar | None = None,
 ) -> Placement:
     """Return the place from which an arm reaches the stroke with the most room in its joints.
 
@@ -119,20 +139,22 @@ def place(
         force: Expected force on the blade [N], toughness times the length of edge in the tissue. It
             only matters to `auto`; where no arm reaches and renders it, the largest that reaches is
             taken, and renders what it can.
+        trocar: Where the remote centre of a `psm` is, tissue frame [m]; None: where it reaches
+            best.
 
     Raises:
         UsageError: no arm has this name.
         PlacementError: no arm reaches; the message says at which scale one would.
     """
-    found = place_if_reached(stroke, boxes, preset, force=force)
+    found = place_if_reached(stroke, boxes, preset, force=force, trocar=trocar)
     if found is None:
-        largest = list(ARMS)[-1] if preset == AUTO else preset
-        raise PlacementError(_advice(stroke, boxes, largest))
+        largest = CHOSEN_BY_SIZE[-1] if preset == AUTO else preset
+        raise PlacementError(_advice(stroke, boxes, largest, trocar))
     return found
 
 
 def place_if_reached(
-    stroke: Stroke, boxes: FloatArray, preset: str, *, force: float
+    stroke: Stroke, boxes: FloatArray, preset: str, *, force: float, trocar: Trocar | None = None
 ) -> Placement | None:
     """Return the place as `place` does, but None where no arm reaches: what would help takes long.
 
@@ -141,13 +163,14 @@ def place_if_reached(
         boxes: What lies there [m].
         preset: The arm.
         force: Expected force on the blade [N].
+        trocar: Where a remote centre is [m].
 
     Raises:
         UsageError: no arm has this name.
     """
     found = None
     for name in _arms_to_try(preset):
-        placement = _place(stroke, boxes, name)
+        placement = _place(stroke, boxes, name, trocar)
         if placement.margin >= NEEDED_MARGIN:
             found = placement
             if ARMS[name].force >= force:
@@ -183,12 +206,17 @@ def stays_in_reach(placement: Placement, stroke: Stroke, boxes: FloatArray) -> b
     path = blade_path(stroke, boxes, placement.edge_height, times)
     turn = turn_about_z(placement.base_yaw)
     positions = (path.positions - (placement.base_position - placement.tissue_origin)) @ turn
-    reached = reach(measures, positions, turn.T @ path.axes, placement.mount_angle)
+    reached = measures.reach(positions, turn.T @ path.axes, placement.mount_angle)
     return bool(reached.margin.min() >= NEEDED_MARGIN)
 
 
 def place_beside(
-    stroke: Stroke, preset: str, beside: Neighbours, *, at_start: bool = False
+    stroke: Stroke,
+    preset: str,
+    beside: Neighbours,
+    *,
+    at_start: bool = False,
+    trocar: Trocar | None = None,
 ) -> Placement:
     """Return the place from which an arm that holds a grasper reaches, clear of other arms.
 
@@ -198,13 +226,15 @@ def place_beside(
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches.
         beside: What it stands next to.
         at_start: Whether the arms are to be clear of each other at the first instant alone.
+        trocar: Where the remote centre of a `psm` is, tissue frame [m]; None: where it reaches
+            best.
 
     Raises:
         UsageError: no arm has this name.
         PlacementError: no arm reaches.
     """
     for name in _arms_to_try(preset):
-        measures, _ = _measured(name)
+        measures, _ = _measured(name, trocar)
         path = blade_path(stroke, beside.boxes, 0.0, beside.times)._replace(table=beside.table)
         found = search_place(measures, path, beside.others, at_start=at_start)
         placement = _placed(found, measures, name, path)
@@ -236,23 +266,25 @@ def _arms_to_try(preset: str) -> Sequence[str]:
     """
     if preset != AUTO and preset not in ARMS:
         raise unknown("arm", preset, [*ARMS, AUTO])
-    return list(ARMS) if preset == AUTO else [preset]
+    return CHOSEN_BY_SIZE if preset == AUTO else [preset]
 
 
-def _place(stroke: Stroke, boxes: FloatArray, preset: str) -> Placement:
+def _place(stroke: Stroke, boxes: FloatArray, preset: str, trocar: Trocar | None) -> Placement:
     """Return the best place for one arm, whether or not it reaches."""
-    measures, edge_height = _measured(preset)
+    measures, edge_height = _measured(preset, trocar)
     few, many = (np.linspace(0.0, stroke.duration, n) for n in (SAMPLES, DENSE_SAMPLES))
     found = search_place(measures, blade_path(stroke, boxes, edge_height, few))
     placement = _placed(found, measures, preset, blade_path(stroke, boxes, edge_height, many))
     return placement._replace(blade_length=stroke.blade_length, edge_height=edge_height)
 
 
-def _placed(found: Found, measures: Geometry, preset: str, path: InstrumentPath) -> Placement:
+def _placed(found: Found, measures: Kinematics, preset: str, path: InstrumentPath) -> Placement:
     """Return the place that was found, confirmed on a path."""
-    reached = reach(measures, *in_base(path, found.place), found.mount_angle)
-    base = base_of(path, found.place)[0]
-    table = min(base[2], path.lowest - TABLE_CLEARANCE) if path.table is None else path.table
+    reached = measures.reach(*in_base(path, found.place), found.mount_angle)
+    base = found.place.bases[0]
+    table = path.lowest - TABLE_CLEARANCE if path.table is None else path.table
+    if path.table is None and measures.stands_on_table:
+        table = min(base[2], table)
     height = base[2] - table
     return Placement(
         preset,
@@ -268,15 +300,18 @@ def _placed(found: Found, measures: Geometry, preset: str, path: InstrumentPath)
 
 
 @cache
-def _measured(preset: str) -> tuple[Geometry, float]:
+def _measured(preset: str, trocar: Trocar | None = None) -> tuple[Kinematics, float]:
     """Return an arm's geometry, and how far its edge lies from its blade's axis [m]."""
     model = Arm(preset).model
-    return geometry(model), float(model.site("heel").pos[2])
+    edge_height = float(model.site("heel").pos[2])
+    if preset == PSM:
+        return psm_geometry(model)._replace(trocar=trocar), edge_height
+    return geometry(model), edge_height
 
 
-def _advice(stroke: Stroke, boxes: FloatArray, preset: str) -> str:
+def _advice(stroke: Stroke, boxes: FloatArray, preset: str, trocar: Trocar | None) -> str:
     """Return the message that an arm does not reach, by how much, and what to do."""
-    measures, edge_height = _measured(preset)
+    measures, edge_height = _measured(preset, trocar)
     path = blade_path(stroke, boxes, edge_height, np.linspace(0.0, stroke.duration, SAMPLES))
     extent = 1e3 * np.ptp(path.positions, axis=0)
     message = (
@@ -284,7 +319,13 @@ def _advice(stroke: Stroke, boxes: FloatArray, preset: str) -> str:
         f"{1e3 * stroke.blade_length:.0f} mm over "
         f"{extent[0]:.0f} x {extent[1]:.0f} x {extent[2]:.0f} mm (x, y, z)"
     )
-    larger = list(ARMS)[list(ARMS).index(preset) + 1 :]
+    if trocar is not None:
+        return (
+            f"{message}, through a trocar at {list(trocar)}. Move the trocar: at least "
+            f"{1e3 * TROCAR_CLEARANCE:.0f} mm off the body, {1e3 * BASE_HEIGHT:.0f} mm above its "
+            f"table, and {1e3 * LEAST_DEPTH:.0f} to 220 mm from the heel of the blade; or omit it"
+        )
+    larger = CHOSEN_BY_SIZE[list(ARMS).index(preset) + 1 :]
     other = f", or choose --arm {larger[0]}" if larger else ""
     kinds = [STROKES[name] for name in stroke.name.split(", ") if name in STROKES]
     is_drawn = any(not kind.is_planned for kind in kinds)
@@ -302,7 +343,7 @@ def _advice(stroke: Stroke, boxes: FloatArray, preset: str) -> str:
     return f"{message}. It would at {math.exp(low):.2g} times the size: {remedy}"
 
 
-def _reaches(measures: Geometry, path: InstrumentPath) -> bool:
+def _reaches(measures: Kinematics, path: InstrumentPath) -> bool:
     """Whether there is a place from which the arm reaches the path."""
     return search_place(measures, path).margin >= NEEDED_MARGIN
 

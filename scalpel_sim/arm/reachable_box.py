@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from scalpel_sim.arm.arm import ARMS
+from scalpel_sim.arm.arm import CHOSEN_BY_SIZE
 from scalpel_sim.arm.placement import AUTO, PlacementError
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray
@@ -74,10 +74,10 @@ def arm_for(preset: str, shares: FloatArray) -> str:
     """Return which arm is to reach shares of a workspace: the largest, where not all is reached.
 
     Args:
-        preset: What was requested, one of `ARMS` or `auto`.
+        preset: What was requested, one of `arm.ARMS` or `auto`.
         shares: How much of it along each axis, around the start, shape (3,).
     """
-    return list(ARMS)[-1] if preset == AUTO and shares.min() < 1.0 else preset
+    return CHOSEN_BY_SIZE[-1] if preset == AUTO and shares.min() < 1.0 else preset
 
 
 def placed_within(place: Callable[[FloatArray], PlaceT]) -> PlaceT:

@@ -5,7 +5,6 @@ it: it acts through the joints, whatever they are. The model's own actuators are
 would hold the joints where they are.
 """
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
-from scalpel_sim.arm.hand import Impedance
+from scalpel_sim.arm.firm_hand import firm_impedance
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.arm.reachable_box import SMALLEST_SHARE, reachable_part
 from scalpel_sim.arm.standing import Standing
@@ -26,10 +25,6 @@ from scalpel_sim.instruments.lacking_reach import PlaceInScene, place_of_tissue,
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray
 
-_USUAL_MASS, _USUAL_MOMENT = 0.07, 0.07 * 0.08**2
-"""Mass [kg] and moment of inertia [kg m2] that the usual hand feels; see `Impedance`."""
-_LEAST_MOBILITY: Final = 1e-9
-"""Mobility below which an edge does not move [1/kg or 1/(kg m2)]: that is rounding."""
 _SAMPLES: Final = 33
 """Poses along the stroke that the arm must reach."""
 
@@ -122,43 +117,6 @@ def _at_first(arm: DrivenArm) -> FloatArray:
     """Return the configuration of the first keyframe, or that of the model without one."""
     first = arm.model.key_qpos[0] if arm.model.nkey else arm.model.qpos0
     return np.asarray(np.clip(first, *arm.ranges()))
-
-
-def firm_impedance(arm: DrivenArm) -> Impedance:
-    """Return a hand that moves this arm as fast as the usual one moves the arms of the scenes.
-
-    A robot is a hundred times as heavy at its edge: the usual hand would leave it swinging at 5 Hz.
-    Stiffness and damping follow its inertia there (Khatib 1987, IEEE J. Robotics and Automation
-    3:43), and are critical.
-
-    Args:
-        arm: The arm, alone in its model, in a configuration in which it will work.
-    """
-    model, data = arm.model, arm.data
-    position, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-    mujoco.mj_jacSite(model, data, position, rotation, arm.hand.edge)
-    inertia = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, inertia)
-    mass, moment = (_felt(jacobian, inertia) for jacobian in (position, rotation))
-    usual = Impedance()
-    rate = math.sqrt(usual.stiffness / _USUAL_MASS)
-    turning = math.sqrt(usual.rotational_stiffness / _USUAL_MOMENT)
-    return Impedance(
-        max(usual.stiffness, mass * rate**2),
-        max(usual.damping, 2.0 * mass * rate),
-        max(usual.rotational_stiffness, moment * turning**2),
-        max(usual.rotational_damping, 2.0 * moment * turning),
-    )
-
-
-def _felt(jacobian: FloatArray, inertia: FloatArray) -> float:
-    """Return the largest inertia that is felt at the edge [kg or kg m2], where the arm is free.
-
-    It is 0 where no joint moves it at all: slides do not turn it.
-    """
-    mobility = np.linalg.eigvalsh(jacobian @ np.linalg.solve(inertia, jacobian.T))
-    free = mobility[mobility > max(1e-6 * mobility.max(), _LEAST_MOBILITY)]
-    return float(1.0 / free.min()) if len(free) else 0.0
 
 
 def move_to_start(

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from bridge import DeviceLimits, Fixture, TissueFrame
-from scalpel_sim.arm.arm import DrivenArm
+from scalpel_sim.arm.arm import PSM, DrivenArm
 from scalpel_sim.arm.grasper import HALF_PAD, HeldArm
 from scalpel_sim.arm.placement import (
     Placement,
@@ -22,6 +23,7 @@ from scalpel_sim.arm.standing import Standing, StandingFixture, Tabletop
 from scalpel_sim.instruments.own_arm import frame_at, move_to_start, move_within, own_arm
 from scalpel_sim.instruments.scene_graspers import arms_with_graspers
 from scalpel_sim.scene.scene import Scene
+from scalpel_sim.scene.schema import GrasperTable
 from scalpel_sim.strokes.expected_force import ExpectedForce
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.sequence import lengthened
@@ -87,19 +89,21 @@ def project_arm_in(
     Raises:
         PlacementError: there is no such place.
     """
-    boxes, preset, start = around.boxes, scene.arm.preset, stroke.start
+    boxes, start = around.boxes, stroke.start
+    preset, trocar = scene.arm.preset, scene.arm.trocar
     rooms = _rooms_of_graspers(motions, scene, around)
+    graspers = [_alike(grasper, preset) for grasper in scene.graspers]
     # Where a hand will lead it is not known: at the start the arms are clear of each other.
     known = resting_stroke(start) if stroke.is_led else stroke
 
     def beside(placement: Placement) -> tuple[Placement, list[HeldArm]]:
         frame = TissueFrame(origin=placement.tissue_origin)
-        held = arms_with_graspers(scene.graspers, motions, boxes, frame, (placement, known), rooms)
+        held = arms_with_graspers(graspers, motions, boxes, frame, (placement, known), rooms)
         return placement, held
 
     def place_for(tour: Stroke, shares: FloatArray) -> tuple[Placement, list[HeldArm]]:
         name = arm_for(preset, shares)
-        found = place_if_reached(tour, boxes, name, force=needed.force)
+        found = place_if_reached(tour, boxes, name, force=needed.force, trocar=trocar)
         if found is None:
             raise PlacementError(f"arm {name}")
         return beside(found)
@@ -119,11 +123,18 @@ def project_arm_in(
                 f"stroke that begins with the blade upright ({error})"
             ) from error
     else:
-        found = beside(place(stroke, boxes, preset, force=needed.force))
+        found = beside(place(stroke, boxes, preset, force=needed.force, trocar=trocar))
     placement, held = found
     frame = TissueFrame(origin=placement.tissue_origin)
     others = [*held, *_in_world(around, frame)]
     return StandingArms(placement.arm(others=others), frame, stroke, others, room)
+
+
+def _alike(grasper: GrasperTable, preset: str) -> GrasperTable:
+    """Return a grasper on an arm like that with the blade, where the scene leaves it open."""
+    if preset == PSM and grasper.preset is None and grasper.model is None:
+        return msgspec.structs.replace(grasper, preset=PSM)
+    return grasper
 
 
 def own_arm_in(

@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
-from scalpel_sim.arm.arm import DrivenArm, preset_spec, put_base
+from scalpel_sim.arm.arm import ARMS, PSM, DrivenArm, preset_spec, put_base
+from scalpel_sim.arm.firm_hand import firm_impedance
 from scalpel_sim.arm.grasper import (
     FORWARD,
     GRASPER,
@@ -19,29 +20,31 @@ from scalpel_sim.arm.grasper import (
     PADS_HEEL,
     PADS_TIP,
     SHAFT_LENGTH,
+    SHORT_SHAFT,
     Grasper,
     HeldArm,
     add_grasper,
     grasper_spec,
 )
 from scalpel_sim.arm.hand import Impedance, add_hand
-from scalpel_sim.arm.place_search import Spheres
+from scalpel_sim.arm.kinematics import Spheres
 from scalpel_sim.arm.placement import (
     AUTO,
     SAMPLES,
     Neighbours,
     Placement,
+    Trocar,
     covered,
     place_beside,
     stays_in_reach,
 )
+from scalpel_sim.arm.psm_kinematics import WRIST_LEVER
 from scalpel_sim.arm.reachable_box import arm_for, reachable_part
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.driven_grasper import GripSettings
 from scalpel_sim.instruments.lacking_reach import place_of_arm
 from scalpel_sim.instruments.own_arm import (
     expect_angles,
-    firm_impedance,
     frame_at,
     move_to_start,
     move_within,
@@ -119,7 +122,9 @@ def arms_with_graspers(
     for grasper, motion, workspace in zip(graspers, motions, workspaces, strict=True):
         if grasper.model is None:
             preset = grasper.preset or AUTO
-            place, spheres, reached = place_of_grasper(motion, preset, beside, workspace)
+            place, spheres, reached = place_of_grasper(
+                motion, preset, beside, workspace, grasper.trocar
+            )
             beside = beside._replace(others=(*beside.others, spheres))
             arm = preset_with_grasper(motion, place, frame, force=grasper.force, workspace=reached)
         else:
@@ -129,7 +134,11 @@ def arms_with_graspers(
 
 
 def place_of_grasper(
-    motion: GraspMotion, preset: str, beside: Neighbours, workspace: FloatArray | None = None
+    motion: GraspMotion,
+    preset: str,
+    beside: Neighbours,
+    workspace: FloatArray | None = None,
+    trocar: Trocar | None = None,
 ) -> tuple[Placement, Spheres, FloatArray | None]:
     """Return where an arm of the project stands, what covers it, and where a hand may lead it.
 
@@ -141,18 +150,20 @@ def place_of_grasper(
         preset: The arm.
         beside: What it stands next to.
         workspace: Where a hand is to lead it, see `HeldArm.workspace`; None: it follows its script.
+        trocar: Where the remote centre of a `psm` is [m]; None: where it reaches best.
 
     Raises:
         PlacementError: it does not reach its motion, or even a small part of the workspace.
     """
-    path, reached = path_of_grasper(motion), None
+    path, reached = path_of_grasper(motion, preset), None
     if workspace is None:
-        place = place_beside(path, preset, beside)
+        place = place_beside(path, preset, beside, trocar=trocar)
     else:
 
         def place_for(tour: Stroke, shares: FloatArray) -> Placement:
             there = beside._replace(times=np.linspace(0.0, tour.duration, SAMPLES))
-            return place_beside(tour, arm_for(preset, shares), there, at_start=True)
+            name = arm_for(preset, shares)
+            return place_beside(tour, name, there, at_start=True, trocar=trocar)
 
         def reaches(place: Placement, tour: Stroke) -> bool:
             return stays_in_reach(place, tour, beside.boxes)
@@ -162,9 +173,14 @@ def place_of_grasper(
     return place, covered(place, path, beside.boxes, beside.times), reached
 
 
-def path_of_grasper(motion: GraspMotion) -> Stroke:
-    """Return a motion as that of an edge from where an arm holds it to the end of its pads."""
-    return motion.stroke(SHAFT_LENGTH, HALF_PAD)
+def path_of_grasper(motion: GraspMotion, preset: str = AUTO) -> Stroke:
+    """Return a motion as that of an edge from where a preset holds it to the end of its pads."""
+    return motion.stroke(_shaft_length(preset), HALF_PAD)
+
+
+def _shaft_length(preset: str) -> float:
+    """Return the distance from where a preset holds a grasper to the middle of its pads [m]."""
+    return SHORT_SHAFT if preset == PSM else SHAFT_LENGTH
 
 
 def preset_with_grasper(
@@ -184,18 +200,37 @@ def preset_with_grasper(
         force: Largest force of the jaws [N]; None: the usual.
         workspace: See `HeldArm.workspace`.
     """
-    spec = preset_spec(placement.preset)
-    put_base(spec, placement.base_position, placement.base_yaw)
-    stylus, blade = spec.body("stylus"), spec.body("blade")
-    half = 0.5 * placement.mount_angle
-    place = stylus.add_frame(pos=blade.pos, quat=[math.cos(half), math.sin(half), 0.0, 0.0])
-    spec.delete(blade)
-    spec.attach(grasper_spec(spec, force), prefix=GRASPER, frame=place)
-    hand = add_hand(spec, Impedance(), GRASPER + PADS_HEEL, GRASPER + PADS_TIP, FORWARD)
-    qpos = np.append(placement.qpos, 2 * [0.5 * motion.opening(0.0)])
+    heel, tip = GRASPER + PADS_HEEL, GRASPER + PADS_TIP
+    qpos, impedance = np.append(placement.qpos, 2 * [0.5 * motion.opening(0.0)]), Impedance()
+    if placement.preset == PSM:
+        alone = DrivenArm(
+            _preset_holding(placement, force), PSM, ARMS[PSM], heel=heel, tip=tip, forward=FORWARD
+        )
+        alone.reset(qpos)
+        impedance = firm_impedance(alone, lever=WRIST_LEVER)
+    spec = _preset_holding(placement, force)
+    hand = add_hand(spec, impedance, heel, tip, FORWARD)
     origin = frame.points_to_world(-placement.tissue_origin)
     turned = _quaternion(frame.rotation)
     return HeldArm(motion.name, spec, qpos, origin, turned, hand, workspace=workspace)
+
+
+def _preset_holding(placement: Placement, force: float | None) -> mujoco.MjSpec:
+    """Return the model of an arm of the project with a grasper in place of the blade.
+
+    Args:
+        placement: Where the arm stands.
+        force: Largest force of the jaws [N]; None: the usual.
+    """
+    spec = preset_spec(placement.preset)
+    put_base(spec, placement.base_position, placement.base_yaw)
+    blade, half = spec.body("blade"), 0.5 * placement.mount_angle
+    turned = [math.cos(half), math.sin(half), 0.0, 0.0]
+    place = blade.parent.add_frame(pos=blade.pos, quat=turned)
+    spec.delete(blade)
+    grasper = grasper_spec(spec, force, _shaft_length(placement.preset))
+    spec.attach(grasper, prefix=GRASPER, frame=place)
+    return spec
 
 
 def model_with_grasper(

@@ -26,7 +26,7 @@ from tissue import ELEMENTS, PRECISIONS, RELAXATIONS, SCHEMES, Material
 COUPLINGS = ("rigid", "virtual")
 """Names of the couplings between the arm's blade and the one that cuts."""
 
-ARM_CHOICES = ("auto", "touch", "premium")
+ARM_CHOICES = ("auto", "touch", "premium", "psm")
 """Names of the arms, and `auto`: the first of them that reaches."""
 
 LONGEST_RUN = 3600.0
@@ -102,6 +102,7 @@ def check_arm(arm: ArmTable, world: WorldTable) -> None:
     """
     check_choice("arm", arm.preset, ARM_CHOICES)
     virtual_coupling(arm)
+    _check_trocar(arm, "[arm]")
     if arm.model is not None:
         if arm.preset != "auto":
             raise UsageError("[arm] has a preset and a model; choose one")
@@ -115,6 +116,12 @@ def check_arm(arm: ArmTable, world: WorldTable) -> None:
                 raise UsageError(
                     f"[{name}] {key} is for an arm of your own; add [arm] model, or omit it"
                 )
+
+
+def _check_trocar(table: ArmTable | GrasperTable, where: str) -> None:
+    """Refuse a trocar for an arm that goes through none."""
+    if table.trocar is not None and table.preset != "psm":
+        raise UsageError(f'{where} trocar is for preset = "psm"; choose that, or omit it')
 
 
 def virtual_coupling(arm: ArmTable) -> VirtualCoupling | None:
@@ -222,6 +229,7 @@ def check_grasper(grasper: GrasperTable, where: str) -> None:
             raise UsageError(f"{where} has a preset and a model; choose one")
         if grasper.at is None:
             raise UsageError(f"{where} has a model and no at: the site or body that holds it")
+    _check_trocar(grasper, where)
     for key in _OF_MODEL:
         if grasper.model is None and getattr(grasper, key) is not None:
             raise UsageError(f"{where} {key} is for an arm of your own; add a model, or omit it")

@@ -200,7 +200,11 @@ class ArmTable(TomlTable, kw_only=True, frozen=True):
     """`[arm]`: the arm, and how it is coupled to the tissue."""
 
     preset: Text = "auto"
-    """Arm that holds the blade: touch, premium, or auto, the first of them that reaches."""
+    """Arm that holds the blade: touch, premium, or auto, the first of them that reaches; or psm,
+    through a trocar."""
+    trocar: ThreeNumbers | None = None
+    """Where the remote centre of a psm is [m], [its trocar](#through-a-trocar); where it reaches
+    best without."""
     model: FileName | None = None
     """MJCF file of [an arm of your own](#an-arm-of-your-own), in place of a preset."""
     heel: Text = "heel"
@@ -280,7 +284,10 @@ class GrasperTable(TomlTable, kw_only=True, frozen=True):
     name: Name = "left"
     """Name: its columns in `forces.csv` begin with it, and its parts in the model."""
     preset: Text | None = None
-    """Its arm: auto, touch or premium; auto without, unless there is a model."""
+    """Its arm: auto, touch, premium or psm. Without it, and without a model, psm where that holds
+    the blade, else auto."""
+    trocar: ThreeNumbers | None = None
+    """Where the remote centre of a psm is [m]; where it reaches best without."""
     model: FileName | None = None
     """MJCF file of an arm of your own."""
     at: Text | None = None

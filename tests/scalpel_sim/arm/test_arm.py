@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from scalpel_sim.arm.arm import ARMS, ASSETS, Arm, ArmError
+from scalpel_sim.arm.arm import ASSETS, CHOSEN_BY_SIZE, Arm, ArmError
 from tissue import Wrench
 
-BOTH = pytest.mark.parametrize("preset", ARMS)
+BOTH = pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 
 
 @BOTH
@@ -75,7 +75,7 @@ def test_the_base_has_the_given_position_and_yaw():
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="Did you mean 'touch'\\? Known: touch, premium"):
+    with pytest.raises(ValueError, match="Did you mean 'touch'\\? Known: touch, premium, psm"):
         Arm("toch")
 
 

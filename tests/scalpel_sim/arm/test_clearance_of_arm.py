@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bridge import Collisions, FixtureBox, FixtureMesh
-from scalpel_sim.arm.arm import ARMS, Arm
+from scalpel_sim.arm.arm import CHOSEN_BY_SIZE, Arm
 from scalpel_sim.arm.collision_geoms import ArmParts, tables
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 
@@ -31,7 +31,7 @@ def wander(arm, rng, n_frames):
         yield
 
 
-@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_collisions_of_every_frame_are_those_of_a_test_in_every_frame(preset, seed, caplog):
     arm, rng = Arm(preset, blade_length=0.08), np.random.default_rng(seed)

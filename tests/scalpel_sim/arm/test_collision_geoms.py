@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from scalpel_sim.arm.arm import ARMS, Arm
+from scalpel_sim.arm.arm import CHOSEN_BY_SIZE, Arm
 from scalpel_sim.arm.collision_geoms import TABLE_THICKNESS, ArmParts, JointReach, tables
 from scalpel_sim.arm.grasper import add_grasper
 from tests.scalpel_sim.little_arm import MJCF
 
-BOTH = pytest.mark.parametrize("preset", ARMS)
+BOTH = pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import Blade
-from scalpel_sim.arm.arm import ARMS, Arm
+from scalpel_sim.arm.arm import CHOSEN_BY_SIZE, Arm
 from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from tissue import BladeSegment, Wrench
 
@@ -27,7 +27,7 @@ def middle(segment):
     return (segment.tip + segment.heel) / 2.0
 
 
-@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 @pytest.mark.parametrize("axis", range(3))
 def test_a_held_blade_yields_by_force_over_stiffness(preset, axis):
     arm = above_desk(preset)
@@ -47,7 +47,7 @@ def test_a_torque_turns_the_blade_by_torque_over_turning_stiffness():
     assert np.arccos(edges[0] @ edges[1]) == pytest.approx(0.1 / 10.0, rel=0.03)
 
 
-@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 @pytest.mark.parametrize("end", ["tip", "heel"])
 @pytest.mark.parametrize("axis", range(3))
 def test_a_blade_against_tissue_of_10_kilonewton_a_metre_comes_to_rest(preset, end, axis):
@@ -67,7 +67,7 @@ def moved(segment, shift):
     return BladeSegment(segment.tip + shift, segment.heel + shift, segment.forward)
 
 
-@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 def test_the_blade_does_not_lag_behind_a_steady_motion(preset):
     arm = Arm(preset)
     start = arm.blade.segment()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.arm import place_search
-from scalpel_sim.arm.arm import ARMS
+from scalpel_sim.arm.arm import CHOSEN_BY_SIZE
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
 from tests.support.planned_strokes import PLANNED, plan_stroke
 from tissue import block
@@ -21,7 +21,7 @@ def in_world(pose, placement):
     )
 
 
-@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("preset", CHOSEN_BY_SIZE)
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
 @pytest.mark.parametrize("name", PLANNED)
 def test_both_arms_lead_the_blade_along_every_stroke_above_the_table_and_out_of_the_body(
@@ -87,7 +87,7 @@ def test_a_stroke_in_metres_that_is_out_of_reach_is_to_be_drawn_smaller():
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="Known: touch, premium, auto"):
+    with pytest.raises(ValueError, match="Known: touch, premium, psm, auto"):
         place(plan_stroke("straight", SLAB), bounds(SLAB), "omni")
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.arm.arm import ARMS
+from scalpel_sim.arm.arm import CHOSEN_BY_SIZE
 from scalpel_sim.arm.placement import AUTO, PlacementError
 from scalpel_sim.arm.reachable_box import (
     NEAR_ENOUGH,
@@ -66,7 +66,7 @@ def test_a_start_around_which_the_arm_reaches_nearly_nothing_is_refused():
 
 
 def test_the_largest_arm_reaches_where_not_all_is_reached_unless_another_was_asked_for():
-    assert [arm_for(AUTO, share * np.ones(3)) for share in (1.0, 0.5)] == [AUTO, list(ARMS)[-1]]
+    assert [arm_for(AUTO, share * np.ones(3)) for share in (1.0, 0.5)] == [AUTO, CHOSEN_BY_SIZE[-1]]
     assert arm_for("touch", 0.5 * np.ones(3)) == "touch"
 
 
