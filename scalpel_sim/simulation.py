@@ -68,8 +68,6 @@ class Simulation:
         self.arm = arm
         self.link = link
         self.frame = frame
-        self.blade = BladeInstrument(arm, stroke, frame)
-        """The first of the instruments."""
         self.bridge = Bridge(
             link,
             frame,
@@ -78,6 +76,8 @@ class Simulation:
             coupling=coupling,
             passivity=passivity,
         )
+        self.blade = BladeInstrument(arm, stroke, frame, link, self.bridge)
+        """The first of the instruments."""
         self.coupled = {
             "tissue_every": repr(tissue_every),
             "coupling": repr(coupling),
@@ -151,7 +151,10 @@ class Simulation:
 
     @property
     def duration(self) -> float:
-        """Simulated time at which the scripts of all instruments have ended [s]."""
+        """Simulated time at which the scripts of all instruments have ended [s].
+
+        Of strokes that may end otherwise than planned it is the latest, until they have ended.
+        """
         return max(each.duration for each in self.instruments)
 
     @property

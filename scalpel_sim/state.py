@@ -241,6 +241,12 @@ def _put_at(data: Any, places: FloatArray) -> None:
         begin = end
 
 
+def _of_stroke(stroke: Stroke) -> str:
+    """Return what tells a stroke from another one."""
+    path = _digest(stroke.path)
+    return f"{path} {stroke.guards}" if stroke.guards else path
+
+
 def _settings_of(simulation: SavedSimulation) -> dict[str, str]:
     """Return the settings on which the frames after a state depend, by name.
 
@@ -254,7 +260,7 @@ def _settings_of(simulation: SavedSimulation) -> dict[str, str]:
         "MuJoCo": mujoco.__version__,
         "the arm": _digest(compiled),
         "where the tissue lies": repr((frame.origin.tolist(), frame.rotation.tolist())),
-        "the stroke": "recorded" if simulation.stroke.is_led else _digest(simulation.stroke.path),
+        "the stroke": "recorded" if simulation.stroke.is_led else _of_stroke(simulation.stroke),
         "the motions of graspers": repr(
             [
                 "recorded" if each.motion.is_led else repr(each.motion.waypoints)

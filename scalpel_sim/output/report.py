@@ -179,6 +179,9 @@ def _cut(summary: Summary) -> _Rows:
         yield "area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {share}"
     yield "peak force", f"{summary.force_peak_n:.3f} N"
     yield "mean force", f"{summary.force_mean_n:.3f} N"
+    for number, each in enumerate(summary.strokes, 1):
+        how = f"{each['ended']}, {each['time_s']:.3f} s, {each['force_n']:.3g} N"
+        yield f"stroke {number}, {each['kind']}", how
     for number, each in enumerate(summary.attachments, 1):
         name = f"attachment {number}" + (f", {each['where']}" if each["where"] else "")
         peak, end = each["force_peak_n"], each["force_at_end_n"]

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from bridge import TissueDescription, TissueFrame
+from scalpel_sim.instruments.blade_instrument import STROKE_TIME
+from scalpel_sim.instruments.guarded_follower import AS_PLANNED, StrokeEnd
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked import asked_area, asked_pieces, first_areas, n_large
@@ -69,6 +71,8 @@ class RunOutcome:
     """Counters of the bridge."""
     touched: dict[str, int] = field(default_factory=dict)
     """Number of frames in which each pair of parts collided."""
+    stroke_ends: Sequence[StrokeEnd] = ()
+    """How each of the strokes in turn has ended, where a force or the body could end it."""
     held_points: Sequence[int] = ()
     """Number of points that each attachment holds at the end."""
 
@@ -95,7 +99,18 @@ class RunOutcome:
         One that ends before, as `seconds` may say, is not judged by what the stroke was to do; nor
         is a hand.
         """
+        if self.stroke.guards:
+            is_planned = all(end.how == AS_PLANNED for end in self.stroke_ends)
+            return is_planned and len(self.stroke_ends) == len(self.stroke.guards)
         return not self.stroke.is_led and self.seconds >= self.stroke.duration
+
+    @cached_property
+    def stroke_times(self) -> FloatArray:
+        """Time on the clock of the stroke at the start of each frame and at the end [s]."""
+        if not self.stroke.guards:
+            return np.append(self.recording.column("time_s"), self.seconds)
+        clock = self.recording.column(f"{STROKE_TIME}_s")
+        return np.append(clock, clock[-1:])
 
     @property
     def is_body_moved(self) -> bool:
@@ -136,7 +151,10 @@ class RunOutcome:
     def cut_between(self, start: float, end: float) -> float:
         """Return the area that was cut between two instants [m2]."""
         areas = self.recording.column("cut_area_m2")
-        before, after = (areas[: round(t / self.dt)] for t in (start, end))
+        frames = [round(t / self.dt) for t in (start, end)]
+        if self.stroke.guards:  # their clock may stand
+            frames = np.searchsorted(self.stroke_times[:-1], (start, end)).tolist()
+        before, after = (areas[:n] for n in frames)
         return float((after[-1] if len(after) else 0.0) - (before[-1] if len(before) else 0.0))
 
     @property
@@ -198,13 +216,15 @@ class RunOutcome:
     def forwards(self) -> FloatArray:
         """Direction in which the edge was to cut at the end of each frame, shape (n_frames, 3)."""
         times = self.recording.column("time_s") + self.dt
+        if self.stroke.guards:
+            times = self.stroke_times[1:]
         return np.array([self.stroke.pose(t).forward for t in times.tolist()]).reshape(-1, 3)
 
     @property
     def distance_behind(self) -> float:
         """How far the tip is from where it was to be at the end [m]."""
         tip = np.array([self.recording.at_end(f"tip_{axis}_m") for axis in "xyz"])
-        planned = self.stroke.pose(self.seconds).tip
+        planned = self.stroke.pose(float(self.stroke_times[-1])).tip
         return float(np.linalg.norm(self.frame.points_to_tissue(tip) - planned))
 
     @cached_property
@@ -235,8 +255,7 @@ class RunOutcome:
             return slow
         if self.stroke.is_led:
             return None
-        times = self.recording.column("time_s")
-        middles = [self.stroke.pose(t) for t in [*times.tolist(), self.seconds]]
+        middles = [self.stroke.pose(t) for t in self.stroke_times.tolist()]
         ways = np.diff([0.5 * (pose.tip + pose.heel) for pose in middles], axis=0)
         speeds = np.maximum((ways * self.forwards).sum(axis=1), 0.0) / self.dt
         return np.asarray(slow * (1.0 + (speeds / law.doubling_speed) ** law.exponent))
@@ -286,5 +305,6 @@ def outcome_of(
         expected_force=simulation.expected_force,
         counters=bridge.counters.as_numbers(),
         touched=simulation.touching.frames,
+        stroke_ends=() if simulation.blade.progress is None else simulation.blade.progress.ends,
         held_points=[load.n_points for load in bridge.frame_loads],
     )

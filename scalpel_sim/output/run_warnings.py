@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scalpel_sim.instruments.driven_grasper import GripSettings
+from scalpel_sim.instruments.guarded_follower import GAVE_UP, THROUGH
 from scalpel_sim.output.cut_account import (
     MOST,
     Stretch,
@@ -17,7 +18,7 @@ from scalpel_sim.output.cut_account import (
     energy_released,
     length_of_cut,
 )
-from scalpel_sim.output.run_outcome import RunOutcome
+from scalpel_sim.output.run_outcome import COMPLETE, RunOutcome
 
 LEAST_SHARE = 0.95
 """Share of the area that a stroke is to cut from which on it is done: complete cuts of the shipped
@@ -79,6 +80,29 @@ def _untouched(outcome: RunOutcome) -> Iterator[RunWarning]:
     yield RunWarning(
         "untouched", f"the blade never touched the tissue{why}", {"body_moved_m": moved}
     )
+
+
+def _limited(outcome: RunOutcome) -> Iterator[RunWarning]:
+    """Warn of strokes that were to part the body and have not, or gave up at a limit of force."""
+    kinds = [each["kind"] for each in outcome.settings.get("strokes", ())]
+    if outcome.status != COMPLETE or outcome.stroke.is_led:
+        return
+    guards = outcome.stroke.guards
+    for i, guard in enumerate(guards):
+        end = outcome.stroke_ends[i] if i < len(outcome.stroke_ends) else None
+        how = "was not done" if end is None else f"ended {end.how} after {end.time:.3f} s"
+        is_through = end is not None and end.how == THROUGH
+        if guard.is_until_through and not is_through:
+            kind, problem = "not_through", f"is not through: it {how}"
+        elif end is not None and end.how == GAVE_UP:
+            kind, problem = "gave_up", f"waited for the force to fall below {guard.force_limit:g} N"
+            problem += f" and {how}"
+        else:
+            continue
+        why, figures = _reasons(outcome)
+        which = f"stroke {i + 1}" + (f", {kinds[i]}," if i < len(kinds) else "")
+        stroke = {"stroke": i + 1, "ended": None if end is None else end.how}
+        yield RunWarning(kind, f"{which} {problem}; {why}", stroke | figures)
 
 
 def _unfinished_cut(outcome: RunOutcome) -> Iterator[RunWarning]:
@@ -191,7 +215,7 @@ def _area_unpaid(outcome: RunOutcome) -> Iterator[RunWarning]:
 
 
 CHECKS: tuple[tuple[RunCheck, ...], ...] = (
-    (_untouched, _unfinished_cut, _not_parted, _nothing_cut, _blade_inside),
+    (_untouched, _limited, _unfinished_cut, _not_parted, _nothing_cut, _blade_inside),
     (_failed_grasp,),
     (_energy_released,),
     (_area_unpaid,),

@@ -79,6 +79,9 @@ class Summary(NamedTuple):
     """Largest force on the blade, after the device's limits."""
     force_mean_n: float
     """Mean magnitude of the force on the blade over the frames in which there was any."""
+    strokes: list[dict[str, Any]]
+    """How each stroke has ended, and when, where a force or the body could end it: `kind`, `ended`,
+    `time_s`, `force_n`."""
     attachments: list[dict[str, Any]]
     """Of each attachment: what it held, how many points in the end, and its forces."""
     work_of_blade_j: float
@@ -134,6 +137,7 @@ def summarise(outcome: RunOutcome, warnings: Iterable[RunWarning] = ()) -> Summa
         cut_area_paid_m2=_area_paid_for(energies, outcome.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
+        strokes=_strokes(outcome),
         attachments=_attachments(outcome),
         work_of_blade_j=work,
         energies_j=energies,
@@ -171,6 +175,18 @@ def hand_figures(recording: Recording, name: str) -> dict[str, Any]:
         "points_held_most": int(points.max(initial=0.0)),
         "points_held_at_end": int(points[-1]) if len(points) else 0,
     }
+
+
+def _strokes(outcome: RunOutcome) -> list[dict[str, Any]]:
+    """Return how strokes with guards have ended."""
+    rows = outcome.settings.get("strokes", ())
+    force, found = outcome.recording.sizes("force"), []
+    for i, end in enumerate(outcome.stroke_ends):
+        frame = max(round(end.time / outcome.dt) - 1, 0)  # whose force was felt then
+        kind = rows[i]["kind"] if i < len(rows) else ""
+        felt = float(force[frame]) if frame < len(force) else 0.0
+        found.append({"kind": kind, "ended": end.how, "time_s": end.time, "force_n": felt})
+    return found
 
 
 def _attachments(outcome: RunOutcome) -> list[dict[str, Any]]:

@@ -264,7 +264,10 @@ def _run_frames(
         obey()
         if hand is not None:
             return stop.reason is not None or _has_rested(now, hand)
-        return stop.reason is not None or (controls is not None and controls.has_ended)
+        if stop.reason is not None or (controls is not None and controls.has_ended):
+            return True
+        is_free = run.prepared.scene.seconds is None and now.blade.progress is not None
+        return is_free and now.time >= run_time(now, None)
 
     def give_up() -> None:
         if stop.seconds > LONGEST_WAIT:

@@ -6,14 +6,14 @@ from itertools import pairwise
 import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
-from scalpel_sim.strokes.kind import StrokeTable
+from scalpel_sim.strokes.kind import UNTIL_THROUGH, StrokeTable
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import SAMPLE, SPEED_UP_TIME, timed
 from tissue import BladeSegment, FloatArray
 
 KEYS_OF_PATH = (
     ("points", "length"),
-    ("edge", "forward", "slicing_ratio", "saw_amplitude", "saw_frequency", "speed"),
+    ("edge", "forward", "slicing_ratio", "saw_amplitude", "saw_frequency", "speed", *UNTIL_THROUGH),
 )
 """Keys that a stroke along points needs, and that it may have."""
 

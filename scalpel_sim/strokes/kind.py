@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.stroke import Stroke
@@ -17,11 +17,25 @@ from scalpel_sim.tables.values import (
     ThreeNumbers,
     TomlTable,
     TwoShares,
+    one_of,
 )
 from tissue import Material, TetrahedralMesh
 
 DEFAULT_SPEED = 0.06
 """Speed of an unhurried incision [m/s]."""
+
+
+DEFAULT_AT_MOST = 0.03
+"""How much farther than planned a stroke goes that is to part the body [m]."""
+
+DEFAULT_PATIENCE = 2.0
+"""How long a stroke waits at its limit of force [s]: most tissue that relaxes has done so."""
+
+UNTIL_THROUGH = ("until", "at_most")
+"""Keys of strokes that can part a body."""
+
+AtLimit = Annotated[Literal["stop", "wait", "draw back"], one_of("stop", "wait", "draw back")]
+Until = Annotated[Literal["through"], one_of("through")]
 
 
 class StrokeTable(TomlTable, kw_only=True, frozen=True):
@@ -57,6 +71,25 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     """How long the blade rests before it begins [s]."""
     pause: NotNegative = 0.0
     """How long the blade rests afterwards [s]."""
+    force_limit: Positive | None = None
+    """Force on the blade that it does not go on against [N]; any without."""
+    at_limit: AtLimit | None = None
+    """What it does there: stop, with all that was to come; wait: from 80 % of the limit on it goes
+    slower, and stands while the force is above it; or draw back the way it came, and go to the next
+    stroke. stop without."""
+    patience: Positive | None = None
+    """How much time it may lose by waiting before it stops [s]; 2 without."""
+    until: Until | None = None
+    """through: it ends when the body is parted, before or after where it was to end."""
+    at_most: Positive | None = None
+    """How much farther than planned it then goes at most [m]; 0.03 without."""
+
+    @property
+    def farther(self) -> float:
+        """How much farther than planned it may go [m]."""
+        if self.until is None:
+            return 0.0
+        return DEFAULT_AT_MOST if self.at_most is None else self.at_most
 
     @property
     def tip_speed(self) -> float:

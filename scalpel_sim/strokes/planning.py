@@ -146,7 +146,7 @@ def passage_through(row: StrokeTable, body: LyingBody, bend: Bend | None = None)
         length,
         (float(depths.min()), float(depths.max())),
         displacement,
-        beyond=last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + displacement,
+        beyond=last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + displacement + row.farther,
     )
 
 

@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.strokes.kind import LyingBody, StrokeTable, check_positive
+from scalpel_sim.strokes.guard import Guard
+from scalpel_sim.strokes.kind import DEFAULT_PATIENCE, LyingBody, StrokeTable, check_positive
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
@@ -38,7 +39,22 @@ def stroke_through(
         check_positive("speed", row.speed, "m/s")
         check_positive("depth", row.depth, "m")
     paths = [STROKES[row.kind].plan(row, body) for row in strokes]
+    if any(row.force_limit or row.until for row in strokes):
+        for row, path in zip(strokes, paths, strict=True):
+            path.guards = (_guard(row, path.duration),)
     return in_turn(paths, [(row.wait, row.pause) for row in strokes], mesh)
+
+
+def _guard(row: StrokeTable, duration: float) -> Guard:
+    """Return what may end the stroke of a row otherwise than planned."""
+    return Guard(
+        0.0,
+        duration,
+        force_limit=math.inf if row.force_limit is None else row.force_limit,
+        at_limit=row.at_limit or "stop",
+        patience=DEFAULT_PATIENCE if row.patience is None else row.patience,
+        is_until_through=row.until is not None,
+    )
 
 
 def cuts_somewhere(strokes: Sequence[StrokeTable]) -> bool:
@@ -69,6 +85,21 @@ def check_strokes(strokes: Sequence[StrokeTable]) -> None:
             raise UsageError(
                 f"{where} has one of saw_amplitude and saw_frequency; give both or none"
             )
+        _check_limit(row, where)
         problem = STROKES[row.kind].problem(row)
         if problem is not None:
             raise UsageError(f'{where} of kind "{row.kind}" {problem}')
+
+
+def _check_limit(row: StrokeTable, where: str) -> None:
+    """Check that keys of a limit have one.
+
+    Raises:
+        UsageError: they do not.
+    """
+    if row.at_limit is not None and row.force_limit is None:
+        raise UsageError(f"{where} has at_limit and no force_limit; give one, or omit it")
+    if row.patience is not None and row.at_limit != "wait":
+        raise UsageError(f'{where} has patience; it is for at_limit = "wait"')
+    if row.at_most is not None and row.until is None:
+        raise UsageError(f'{where} has at_most; it is for until = "through"')

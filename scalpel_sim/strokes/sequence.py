@@ -7,7 +7,7 @@ import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.stroke import Stroke
-from scalpel_sim.strokes.timing import timed
+from scalpel_sim.strokes.timing import SAMPLE, timed
 from tissue import BladeSegment, FloatArray, TetrahedralMesh
 
 _SPEED = 0.1
@@ -45,7 +45,7 @@ def in_turn(
     length = max(stroke.blade_length for stroke in strokes)
     box = mesh.positions.min(axis=0) - _CLEARANCE, mesh.positions.max(axis=0) + _CLEARANCE
     poses: Poses = []
-    asked = []
+    asked, guards = [], []
     for stroke, (wait, pause) in zip(strokes, rests, strict=True):
         own = [(t, _lengthened(stroke.pose(t), length)) for t in stroke.times.tolist()]
         start = 0.0
@@ -56,16 +56,18 @@ def in_turn(
             start = poses[-1][0]
             if wait == 0.0:
                 own = own[1:]
+        begin = start
         if wait > 0.0:
             poses += [] if poses else [(0.0, own[0][1])]
             start += wait
         poses += [(start + t, pose) for t, pose in own]
+        guards += [each.moved_by(start, pause)._replace(begin=begin) for each in stroke.guards]
         asked += [(start + a, start + b) for a, b in stroke.asked or ()]
         if pause > 0.0:
             poses.append((poses[-1][0] + pause, poses[-1][1]))
     times, segments = zip(*poses, strict=True)
     name = ", ".join(stroke.name for stroke in strokes)
-    return Stroke(np.array(times), segments, name, asked=asked or None)
+    return Stroke(np.array(times), segments, name, asked=asked or None, guards=guards)
 
 
 def lengthened(stroke: Stroke, length: float) -> Stroke:
@@ -86,7 +88,22 @@ def lengthened(stroke: Stroke, length: float) -> Stroke:
         )
     times = stroke.times.tolist()
     poses = [_lengthened(stroke.pose(t), length) for t in times]
-    return Stroke(times, poses, stroke.name, asked=stroke.asked)
+    return Stroke(times, poses, stroke.name, asked=stroke.asked, guards=stroke.guards)
+
+
+def through_air(start: BladeSegment, end: BladeSegment, bounds: FloatArray) -> Stroke:
+    """Return the way of a blade from a pose to another one, out of a body and above it.
+
+    Args:
+        start: Where it is.
+        end: Where it goes.
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+    """
+    way = _way(start, end, (bounds[0] - _CLEARANCE, bounds[1] + _CLEARANCE))
+    if len(way) == 1:  # it is there
+        way = [*way, (SAMPLE, end)]
+    times, poses = zip(*way, strict=True)
+    return Stroke(times, poses)
 
 
 def _lengthened(pose: BladeSegment, length: float) -> BladeSegment:

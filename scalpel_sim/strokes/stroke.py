@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError, numbered_lines, numbers_of
+from scalpel_sim.strokes.guard import Guard
 from tissue import BladeSegment, FloatArray
 
 _SAME_LENGTH = 0.01
@@ -37,6 +38,7 @@ class Stroke:
         segments: The n poses, n >= 2. `forward` is made orthogonal to the edge.
         name: For messages and reports.
         asked: Intervals in which the edge passes what it is to cut [s]; None where it is not known.
+        guards: What may end each of the strokes in turn otherwise; none where nothing may.
         is_led: Whether a person leads it, or has led it.
 
     Raises:
@@ -52,9 +54,12 @@ class Stroke:
         name: str = "",
         *,
         asked: Sequence[tuple[float, float]] | None = None,
+        guards: Sequence[Guard] = (),
         is_led: bool = False,
     ) -> None:
         self.name = name
+        self.guards = tuple(guards)
+        """What may end each of the strokes in turn otherwise; none where nothing may."""
         self.is_led = is_led
         """Whether a person leads it, or has led it: the arm then stands where it reaches all
         around the body, wherever that stroke goes."""

@@ -28,7 +28,9 @@ _PER_LEG = 200
 )
 def points(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return a stroke along straight lines through the points of its row."""
-    return led_along(row, np.array(row.points))
+    corners = np.array(row.points)
+    corners[-1] += _farther(row, corners)
+    return led_along(row, corners)
 
 
 @stroke_kind(
@@ -38,7 +40,19 @@ def points(row: StrokeTable, body: LyingBody) -> Stroke:
 )
 def spline(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return a stroke along a smooth curve through the points of its row, without a stop."""
-    return led_along(row, _spline(np.array(row.points)), rests=False)
+    curve = _spline(np.array(row.points))
+    if row.farther > 0.0:
+        curve = np.vstack([curve, curve[-1] + _farther(row, curve)])
+    return led_along(row, curve, rests=False)
+
+
+def _farther(row: StrokeTable, points: FloatArray) -> FloatArray:
+    """Return how far a path may go on beyond its last point [m], shape (3,)."""
+    last = points[-1] - points[-2]
+    length = float(np.linalg.norm(last))
+    if length <= SAME_POINT:
+        raise StrokeError("the last two points of the stroke are the same; leave one out")
+    return np.asarray(row.farther / length * last)
 
 
 def _spline(points: FloatArray) -> FloatArray:

@@ -2,7 +2,13 @@
 
 import math
 
-from scalpel_sim.strokes.kind import LyingBody, StrokeTable, check_positive, stroke_kind
+from scalpel_sim.strokes.kind import (
+    UNTIL_THROUGH,
+    LyingBody,
+    StrokeTable,
+    check_positive,
+    stroke_kind,
+)
 from scalpel_sim.strokes.planned_sheet import PlannedSheet
 from scalpel_sim.strokes.planning import MiddleSection, passage_through
 from scalpel_sim.strokes.stroke import Stroke
@@ -32,7 +38,9 @@ where the body is displaced first."""
 
 
 @stroke_kind(
-    "a plane across the middle of the body, clean through", possible=("speed",), is_planned=True
+    "a plane across the middle of the body, clean through",
+    possible=("speed", *UNTIL_THROUGH),
+    is_planned=True,
 )
 def straight(row: StrokeTable, body: LyingBody) -> Stroke:
     """Return a stroke along a plane across the middle of the body."""
@@ -42,7 +50,7 @@ def straight(row: StrokeTable, body: LyingBody) -> Stroke:
 
 @stroke_kind(
     "a plane that leans by 25 degrees, with the blade raked by 15, clean through",
-    possible=("speed",),
+    possible=("speed", *UNTIL_THROUGH),
     is_planned=True,
 )
 def slanted(row: StrokeTable, body: LyingBody) -> Stroke:
@@ -65,7 +73,7 @@ def _leaning(middle: MiddleSection, strength: float) -> PlannedSheet:
 
 @stroke_kind(
     "a bent sheet across the middle of the body, clean through",
-    possible=("speed",),
+    possible=("speed", *UNTIL_THROUGH),
     is_planned=True,
 )
 def curved(row: StrokeTable, body: LyingBody) -> Stroke:

@@ -1,0 +1,34 @@
+"""`Guard`: what may end one of the strokes in turn before or after its plan, or make it wait."""
+
+import math
+from typing import NamedTuple
+
+
+class Guard(NamedTuple):
+    """One of the strokes in turn on its own clock, which stands while it waits."""
+
+    begin: float
+    """When it begins, on the clock of all strokes together [s]."""
+    end: float
+    """When it ends at the latest: where it has gone as far as it may."""
+    pause: float = 0.0
+    """How long the blade rests afterwards [s]."""
+    force_limit: float = math.inf
+    """Force on the blade at which something is done [N]."""
+    at_limit: str = "stop"
+    """What is done then: see `StrokeTable.at_limit`."""
+    patience: float = 0.0
+    """How much time it may lose by waiting before it stops [s]."""
+    is_until_through: bool = False
+    """Whether it ends as soon as the body is parted."""
+
+    def moved_by(self, seconds: float, pause: float) -> "Guard":
+        """Return it on a clock that is ahead [s], with a rest afterwards [s]."""
+        return self._replace(begin=self.begin + seconds, end=self.end + seconds, pause=pause)
+
+    @property
+    def longest_delay(self) -> float:
+        """How much longer than planned it may take by itself [s], ways through the air excluded."""
+        if self.force_limit == math.inf:
+            return 0.0
+        return {"wait": self.patience, "draw back": self.end - self.begin}.get(self.at_limit, 0.0)
