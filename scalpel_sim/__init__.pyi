@@ -1,6 +1,7 @@
 from .arm.blade import Blade as Blade
 from .arm.grasper import Grasper as Grasper
 from .arm.grasper import add_grasper as add_grasper
+from .arm.scalpel import add_scalpel as add_scalpel
 from .instruments.driven_grasper import between_pads as between_pads
 from .instruments.geom_coupling import GeomCoupling as GeomCoupling
 from .instruments.grip import Grip as Grip
@@ -47,6 +48,7 @@ __all__ = [
     "Viewer",
     "WaypointTable",
     "add_grasper",
+    "add_scalpel",
     "between_pads",
     "changed",
     "prepare",

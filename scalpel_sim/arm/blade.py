@@ -1,5 +1,6 @@
 """A blade on any MuJoCo arm: two sites become a segment, a wrench pushes their body."""
 
+import difflib
 import math
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -195,9 +196,12 @@ def number_in(
 
 
 def no_such(kind: str, name: str, names: Iterable[str]) -> str:
-    """Return that a model has no element of a name, and those that it has, for a message."""
-    there = ", ".join(f"'{each}'" for each in names if each) or "none with a name"
-    return f"the model has no {kind} '{name}'. It has: {there}"
+    """Return that a model has no element of a name, the nearest and all that it has."""
+    named = [each for each in names if each]
+    near = difflib.get_close_matches(name, named, n=1)
+    hint = f"Did you mean '{near[0]}'? " if near else ""
+    there = ", ".join(f"'{each}'" for each in named) or "none with a name"
+    return f"the model has no {kind} '{name}'. {hint}It has: {there}"
 
 
 def _across(edge: FloatArray, forward: FloatArray) -> FloatArray:

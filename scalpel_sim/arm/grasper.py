@@ -6,9 +6,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from scalpel_sim.arm.blade import no_such
 from scalpel_sim.arm.free_names import free_prefix, names_in
 from scalpel_sim.arm.hand import Hand
+from scalpel_sim.arm.mounting import Place, attach_at
 from scalpel_sim.arm.standing import collide_as_one_arm
 from tissue import BladeSegment, FloatArray, Wrench
 
@@ -63,34 +63,27 @@ class Pads(NamedTuple):
     """Half the opening, half the length of a pad, half its width [m], shape (3,)."""
 
 
-def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> str:
-    """Attach a grasper to a body or a site of a model, with its shaft along the +z there.
+def add_grasper(spec: mujoco.MjSpec, at: Place, *, force: float | None = None) -> str:
+    """Attach a grasper to a site, a body or a frame of a model, with its shaft along the +z there.
 
     That is how the flanges of robots point. The actuator `grasper_jaws` opens the jaws [m]; where
     the model has one of the names of its parts, all of them get another prefix.
 
     Args:
         spec: A model that is yet to be compiled.
-        at: Name of a site, or of a body, at whose origin the shaft begins.
+        at: The site, body or frame, or its name; the shaft begins at its origin.
         force: Largest force of the jaws [N]; None: that of `grasper.xml`.
 
     Returns:
         The prefix of the names of its parts, for `Grasper`: `grasper_` where all are free.
 
     Raises:
-        GrasperError: the model has no such site or body.
+        GrasperError: the model has no such place.
     """
-    site, body = spec.site(at), spec.body(at)
-    if site is None and body is None:
-        names = [each.name for each in (*spec.sites, *spec.bodies)]
-        raise GrasperError(no_such("site or body", at, names))
     grasper = grasper_spec(spec, force)
     grasper.body("shaft").quat = _ALONG_FLANGE
     prefix = free_prefix(spec, names_in(grasper), GRASPER)
-    if site is None:
-        spec.attach(grasper, prefix=prefix, frame=body.add_frame())
-    else:
-        spec.attach(grasper, prefix=prefix, site=site)
+    attach_at(spec, grasper, at, prefix, GrasperError)
     return prefix
 
 

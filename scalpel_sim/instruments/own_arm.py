@@ -1,4 +1,4 @@
-"""An arm of the user's own: any MJCF with a blade, led by a hand at its edge.
+"""An arm of the user's own: any MJCF or URDF, led by a hand at the edge of its blade.
 
 The hand is Cartesian impedance control at the blade, with gravity compensated, as robot arms offer
 it: it acts through the joints, whatever they are. The model's own actuators are taken out, for they
@@ -8,7 +8,7 @@ would hold the joints where they are.
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -17,32 +17,50 @@ from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
 from scalpel_sim.arm.firm_hand import firm_impedance
+from scalpel_sim.arm.hand import Impedance
+from scalpel_sim.arm.model_file import spec_of_file
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.arm.reachable_box import SMALLEST_SHARE, reachable_part
+from scalpel_sim.arm.scalpel import HEEL, TIP, add_scalpel
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.lacking_reach import PlaceInScene, place_of_tissue, what_it_lacks
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import BladeSegment, FloatArray
+from tissue import BladeSegment, BladeShape, FloatArray
 
 _SAMPLES: Final = 33
 """Poses along the stroke that the arm must reach."""
+
+
+class Mount(NamedTuple):
+    """A scalpel that a model without a blade holds."""
+
+    at: str
+    """Site, body or frame that holds it along its +z."""
+    blade: BladeShape
+    """Its cross-section."""
+    length: float
+    """Length of its edge [m]."""
+    forward: Sequence[float] = (0.0, 1.0, 0.0)
+    """Direction in which the edge cuts, in the frame of the place."""
 
 
 def own_arm(
     path: Path,
     limits: DeviceLimits,
     *,
+    mount: Mount | None = None,
     heel: str = "heel",
     tip: str = "tip",
     forward: Sequence[float] = (0.0, 0.0, -1.0),
     others: Sequence[Standing] = (),
 ) -> DrivenArm:
-    """Return the arm of an MJCF file, in the configuration of its first keyframe if it has one.
+    """Return the arm of a file, in the configuration of its first keyframe if it has one.
 
     Args:
-        path: The file. It needs two sites at the ends of the edge, on one body.
+        path: The file. Without a mount it needs two sites at the ends of the edge, on one body.
         limits: Largest force and torque that the arm can render.
+        mount: Scalpel that it holds; its edge then is that of the arm. None: it has a blade.
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
@@ -51,13 +69,22 @@ def own_arm(
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.
     """
-    led = partial(DrivenArm, heel=heel, tip=tip, forward=forward)
+    edge = partial(DrivenArm, heel=heel, tip=tip, forward=forward)
+
+    def led(*settings: Impedance, others: Sequence[Standing] = ()) -> DrivenArm:
+        spec, arm = own_spec(path), edge
+        if mount is not None:
+            prefix = add_scalpel(
+                spec, mount.at, mount.blade, length=mount.length, forward=mount.forward
+            )
+            arm = partial(DrivenArm, heel=prefix + HEEL, tip=prefix + TIP)
+        return arm(spec, path.stem, limits, *settings, others=others)
+
     try:
-        usual = led(own_spec(path), path.stem, limits)
+        usual = led()
         expect_angles(usual.model)
         usual.reset(_at_first(usual))
-        firm = firm_impedance(usual)
-        arm = led(own_spec(path), path.stem, limits, firm, others=others)
+        arm = led(firm_impedance(usual), others=others)
     except ValueError as error:
         raise UsageError(f"[arm] model {path}: {error}") from error
     arm.reset(_at_first(usual))
@@ -72,7 +99,7 @@ def own_spec(path: Path) -> mujoco.MjSpec:
     Raises:
         ValueError: the file cannot be read, or is no model.
     """
-    spec = mujoco.MjSpec.from_file(str(path))
+    spec = spec_of_file(path)
     for sensor in list(spec.sensors):
         if mujoco.mjtObj.mjOBJ_ACTUATOR in (sensor.objtype, sensor.reftype):
             spec.delete(sensor)

@@ -20,10 +20,17 @@ from scalpel_sim.arm.placement import (
 )
 from scalpel_sim.arm.reachable_box import arm_for, reachable_part
 from scalpel_sim.arm.standing import Standing, StandingFixture, Tabletop
-from scalpel_sim.instruments.own_arm import frame_at, move_to_start, move_within, own_arm
+from scalpel_sim.instruments.own_arm import (
+    Mount,
+    frame_at,
+    move_to_start,
+    move_within,
+    own_arm,
+)
 from scalpel_sim.instruments.scene_graspers import arms_with_graspers
+from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.schema import GrasperTable
+from scalpel_sim.scene.schema import ArmTable, GrasperTable
 from scalpel_sim.strokes.expected_force import ExpectedForce
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.sequence import lengthened
@@ -154,7 +161,7 @@ def own_arm_in(
     Raises:
         ValueError: it cannot be read, or does not reach.
     """
-    arm, frame = _own(scene)
+    arm, frame = _own(scene, stroke.blade_length)
     stroke = _as_long(stroke, arm.blade.length)
     room = None
     if stroke.is_led:
@@ -170,7 +177,7 @@ def own_arm_in(
     ]
     if others:
         start = np.array(arm.data.qpos)
-        arm, _ = _own(scene, others)
+        arm, _ = _own(scene, stroke.blade_length, others)
         arm.reset(start)
     return StandingArms(arm, frame, stroke, others, room)
 
@@ -210,14 +217,28 @@ def _in_world(around: ArmSurroundings, frame: TissueFrame) -> list[Standing]:
     return found if around.table is None else [around.table._replace(frame=frame), *found]
 
 
-def _own(scene: Scene, others: Sequence[Standing] = ()) -> tuple[DrivenArm, TissueFrame]:
-    """Return an arm of the user's own, and where the tissue lies in its world."""
+def _own(
+    scene: Scene, length: float, others: Sequence[Standing] = ()
+) -> tuple[DrivenArm, TissueFrame]:
+    """Return an arm of the user's own, and where the tissue lies in its world.
+
+    Args:
+        scene: The scene.
+        length: Length of the edge of a scalpel that it holds [m]; a blade of its own has its own.
+        others: What else stands in its world.
+    """
     own, world = scene.arm, scene.world
     assert own.model is not None
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
+    mount = None
+    if own.mount is not None:
+        mount = Mount(own.mount, scene.blade or SCALPEL, length)
+        if own.forward != ArmTable().forward:
+            mount = mount._replace(forward=own.forward)
     arm = own_arm(
         Path(own.model),
         limits,
+        mount=mount,
         heel=own.heel,
         tip=own.tip,
         forward=own.forward,

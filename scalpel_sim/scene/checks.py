@@ -35,7 +35,10 @@ LONGEST_RUN = 3600.0
 _SMALLEST_TILT = 1e-6
 """Sine of the angle between the line of sight and `up` below which a picture has no upper side."""
 
-OF_OWN_ARM = ("heel", "tip", "forward", "force", "torque")
+_OF_OWN_BLADE = ("heel", "tip")
+"""Keys of `[arm]` that name the blade of such an arm that has one."""
+
+OF_OWN_ARM = ("mount", *_OF_OWN_BLADE, "forward", "force", "torque")
 """Keys of `[arm]` that describe an arm of the user's own."""
 
 OF_PLACE = ("pos", "quat")
@@ -108,6 +111,12 @@ def check_arm(arm: ArmTable, world: WorldTable) -> None:
             raise UsageError("[arm] has a preset and a model; choose one")
         if not any(world.quat):
             raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
+        for key in _OF_OWN_BLADE:
+            if arm.mount is not None and getattr(arm, key) != getattr(ArmTable(), key):
+                raise UsageError(
+                    f"[arm] has mount = '{arm.mount}', which holds a scalpel, and {key} = "
+                    f"'{getattr(arm, key)}', of a blade of its own; omit one of them"
+                )
         return
     for name, table, keys in (("arm", arm, OF_OWN_ARM), ("world", world, OF_PLACE)):
         usual = type(table)()
@@ -228,7 +237,9 @@ def check_grasper(grasper: GrasperTable, where: str) -> None:
         if grasper.preset is not None:
             raise UsageError(f"{where} has a preset and a model; choose one")
         if grasper.at is None:
-            raise UsageError(f"{where} has a model and no at: the site or body that holds it")
+            raise UsageError(
+                f"{where} has a model and no at: the site, body, frame or link that holds it"
+            )
     _check_trocar(grasper, where)
     for key in _OF_MODEL:
         if grasper.model is None and getattr(grasper, key) is not None:

@@ -152,7 +152,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     def settings(self) -> dict[str, Any]:
         """Return the numbers and names of the scene, for a report."""
         world, solver, arm = self.world, self.solver, self.arm
-        own = _values(arm, "model", "heel", "tip", "forward", "force", "torque")
+        own = _values(arm, "model", "mount", "heel", "tip", "forward", "force", "torque")
         return {
             "about": self.about,
             "material": self.material.as_keys(),

@@ -206,13 +206,17 @@ class ArmTable(TomlTable, kw_only=True, frozen=True):
     """Where the remote centre of a psm is [m], [its trocar](#through-a-trocar); where it reaches
     best without."""
     model: FileName | None = None
-    """MJCF file of [an arm of your own](#an-arm-of-your-own), in place of a preset."""
+    """MJCF or URDF file of [an arm of your own](#an-arm-of-your-own), in place of a preset."""
+    mount: Text | None = None
+    """Site, body, frame or link of that model that holds a scalpel, along its +z, in place of a
+    blade of its own."""
     heel: Text = "heel"
     """Site of that model at the handle's end of the edge."""
     tip: Text = "tip"
     """Site at the sharp end."""
     forward: ThreeNumbers = (0.0, 0.0, -1.0)
-    """Direction in which the edge cuts, in the frame of its body."""
+    """Direction in which the edge cuts, in the frame of its body; with a mount in that of the
+    mount, and [0, 1, 0] without."""
     force: Positive | None = None
     """Largest force that it can render [N]; any without."""
     torque: Positive | None = None
@@ -289,10 +293,10 @@ class GrasperTable(TomlTable, kw_only=True, frozen=True):
     trocar: ThreeNumbers | None = None
     """Where the remote centre of a psm is [m]; where it reaches best without."""
     model: FileName | None = None
-    """MJCF file of an arm of your own."""
+    """MJCF or URDF file of an arm of your own."""
     at: Text | None = None
-    """Site or body of that model which holds the grasper, along its +z, as flanges of robots
-    point."""
+    """Site, body, frame or link of that model which holds the grasper, along its +z, as
+    flanges of robots point."""
     pos: ThreeNumbers | None = None
     """Origin of that model in the frame of the tissue [m]; [0, 0, 0] without."""
     quat: FourNumbers | None = None

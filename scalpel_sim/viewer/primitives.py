@@ -141,16 +141,22 @@ SPINE_LENGTH = 0.45
 
 
 def edge_in_geom(model: mujoco.MjModel, geom: int) -> tuple[FloatArray, FloatArray] | None:
-    """Return heel and tip [m] in a box's frame, if the box is the sheet that carries them."""
+    """Return heel and tip [m] in a box's frame, if the box is the sheet that carries them.
+
+    The sites `heel` and `tip` may have a prefix, as those of a scalpel on an arm.
+    """
+    body = model.geom_bodyid[geom]
+    sites = {model.site(int(i)).name: i for i in np.flatnonzero(model.site_bodyid == body)}
+    pairs = [(name, f"{name.removesuffix('heel')}tip") for name in sites if name.endswith("heel")]
+    names = next((pair for pair in pairs if pair[1] in sites), None)
+    if names is None:
+        return None
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
-    ends = []
-    for name in ("heel", "tip"):
-        site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
-        if site < 0 or model.site_bodyid[site] != model.geom_bodyid[geom]:
-            return None
-        ends.append((model.site_pos[site] - model.geom_pos[geom]) @ matrix.reshape(3, 3))
-    heel, tip = ends
+    heel, tip = (
+        (model.site_pos[sites[name]] - model.geom_pos[geom]) @ matrix.reshape(3, 3)
+        for name in names
+    )
     size = model.geom_size[geom]
     fits = (np.abs([heel, tip]) <= size + _MARGIN * size.max()).all()
     is_in_sheet = np.abs(tip - heel).argmax() != size.argmin() and not np.array_equal(heel, tip)

@@ -86,7 +86,10 @@ def test_an_implausible_wrench_never_reaches_mujoco(arm, bad, where):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"heel": "hell"}, "no site 'hell'. It has: 'nail', 'heel', 'tip', 'tip2'"),
+        (
+            {"heel": "hell"},
+            "no site 'hell'. Did you mean 'heel'? It has: 'nail', 'heel', 'tip', 'tip2'",
+        ),
         ({"body": "hand"}, "no body 'hand'. It has: 'upper', 'blade'"),
         ({"heel": "nail"}, "site 'nail' sits on body 'world', not on 'blade'"),
         ({"body": "upper"}, "site 'heel' sits on body 'blade', not on 'upper'"),

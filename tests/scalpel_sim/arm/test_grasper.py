@@ -77,7 +77,7 @@ def test_it_points_along_z_of_the_body_or_site_that_holds_it(at, middle, along):
 
 
 def test_a_place_that_is_not_there_is_refused_with_those_that_are():
-    with pytest.raises(GrasperError, match=r"no site or body 'flang'\. .* 'flange', .*'arm'"):
+    with pytest.raises(GrasperError, match=r"no site, body or frame 'flang'\. .*'flange', .*'arm'"):
         add_grasper(mujoco.MjSpec.from_string(FLANGE), "flang")
 
 
