@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from bridge import InProcessLink
@@ -174,6 +174,17 @@ class Pace:
         self._simulated = 0.0
 
 
+class RunResults(NamedTuple):
+    """What a run has given, for its page."""
+
+    figures: Sequence[tuple[str, str]]
+    """Labels and figures."""
+    folder: str
+    """Folder of its files."""
+    replay: str
+    """Path of the replay; empty: there is none."""
+
+
 class RunControls:
     """Obeys the commands of a page between frames, and passes on those to the hand.
 
@@ -205,6 +216,8 @@ class RunControls:
         """The run that the page has requested after this one."""
         self.notice = ""
         """Message of the page to the person."""
+        self.results: RunResults | None = None
+        """What the run has given; None: it goes on."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
         self.on_wait: Callable[[], None] = lambda: None

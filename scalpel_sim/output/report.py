@@ -77,6 +77,19 @@ def print_summary(summary: Summary, console: Console) -> None:
         console.print(_account(summary.energies_j, summary.residual_of_work))
 
 
+def headline(summary: Summary) -> list[tuple[str, str]]:
+    """Return labels and figures of what a person wants to know first."""
+    rows = [
+        ("cut area", f"{_MM2_PER_M2 * summary.cut_area_m2:,.0f} mm\u00b2"),
+        ("force, mean", f"{summary.force_mean_n:.2f} N"),
+        ("force, peak", f"{summary.force_peak_n:.2f} N"),
+        ("work of the blade", f"{_MJ_PER_J * summary.work_of_blade_j:.1f} mJ"),
+    ]
+    if summary.pieces is not None:
+        rows.insert(1, ("pieces", f"{summary.pieces}"))
+    return rows
+
+
 def _table(title: str, n_figures: int) -> Table:
     """Return an empty table of a label and some figures a row."""
     table = Table(title=title, title_justify="left", show_header=False)

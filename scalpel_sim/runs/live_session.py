@@ -6,16 +6,19 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
 from typing import NamedTuple, Self
 
 from bridge import LinkError
 from scalpel_sim.errors import RunError
-from scalpel_sim.hands.commands import Begin, Choose, Command, End, Engage, Jaws
-from scalpel_sim.hands.run_controls import History, Pace, RunControls
+from scalpel_sim.hands.commands import Begin, Choose, Command, End, Engage, Jaws, Reset
+from scalpel_sim.hands.run_controls import History, Pace, RunControls, RunResults
 from scalpel_sim.hands.teleoperation import LiveHand
+from scalpel_sim.output.report import headline
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.runs.console import print_report, say, wait_until
 from scalpel_sim.runs.device_run import DeviceRun, device_run, perform_device
+from scalpel_sim.runs.file_names import REPLAY
 from scalpel_sim.runs.options import DeviceOptions, PageOptions
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import perform
@@ -93,9 +96,11 @@ class LiveSession:
         run: _LiveRun | None = self._begun(Begin(is_led=self._page.hand != "script"))
         while run is not None:
             summary = self._done(run)
-            run.show()
             if summary is not None:
+                run.controls.results = results_of(summary, run.prepared.folder)
                 print_report(summary, run.prepared)
+            run.controls.has_ended = True
+            run.show()
             run = self._after(run, summary is not None)
 
     def _begun(self, asked: Begin) -> _LiveRun:
@@ -124,7 +129,7 @@ class LiveSession:
         """Return the viewer, in which the run begins."""
         simulation, scene = prepared.simulation, prepared.scene
         choices, is_led_by_device = None, self._page.hand == "device"
-        if prepared.is_here and not is_led_by_device:
+        if self._may_choose(prepared):
             self._first = self._first or scene.name
             choices = Choices(
                 self._first,
@@ -156,6 +161,10 @@ class LiveSession:
                 controls=controls,
             )
         return self._viewer
+
+    def _may_choose(self, prepared: PreparedRun) -> bool:
+        """Return whether the page may request another run."""
+        return prepared.is_here and self._page.hand != "device"
 
     def _done(self, run: _LiveRun) -> Summary | None:
         """Do a run; None where another was requested before it began."""
@@ -201,7 +210,6 @@ class LiveSession:
 
     def _after(self, run: _LiveRun, has_files: bool) -> _LiveRun | None:
         """Wait until the page requests another run, and begin it; None: it is not wanted."""
-        run.controls.has_ended = True
         while (asked := self._asked_next(run, says=has_files)) is not None:
             has_files = False
             run.controls.notice = "preparing the next run"
@@ -228,9 +236,19 @@ class LiveSession:
                     command = self._commands.popleft()
                     if isinstance(command, Begin):
                         return command
+                    if isinstance(command, Reset) and self._may_choose(run.prepared):
+                        return run.asked
                 run.controls.on_wait()
                 time.sleep(SECONDS_PER_CHECK)
         return None
+
+
+def results_of(summary: Summary, folder: Path) -> RunResults:
+    """Return what a run has given, for its page."""
+    replay = folder.resolve() / REPLAY
+    return RunResults(
+        headline(summary), str(folder.resolve()), str(replay) if replay.is_file() else ""
+    )
 
 
 def _wait_for_start(url: str) -> None:

@@ -17,6 +17,11 @@ UPDATES_PER_SECOND = 25.0
 """Rate at which the pages are updated, per second of wall time."""
 
 
+MOST_ROWS_OF_FORCES = 5000
+"""Rows of forces that wait for a page at most: those of the seconds that its plot shows, in frames
+of a millisecond."""
+
+
 NO_VALUES: Mapping[SurfaceQuantity, FloatArray] = {}
 """No quantities."""
 
@@ -87,6 +92,13 @@ class SceneState(NamedTuple):
     """How the run is, if the page controls it."""
     values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES
     """Quantities at the vertices of the surface, for pages that show them as colours, SI."""
+
+
+class ForceRows(NamedTuple):
+    """A message before that of a state: the forces of all frames since the last one."""
+
+    rows: list[tuple[float, ...]]
+    """Of each frame: time [s], force on the blade [N], and on each grasper [N]."""
 
 
 class StartReply(msgspec.Struct):

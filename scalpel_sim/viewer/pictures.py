@@ -67,6 +67,8 @@ def into_viewer(
     """
 
     def draw(simulation: Simulation) -> None:
+        on_graspers = (math.hypot(*each.wrench.force) for each in simulation.graspers)
+        viewer.add_forces(simulation.time, math.hypot(*simulation.wrench.force), *on_graspers)
         if viewer.is_due():
             show_in(viewer, simulation, live_state())
 
@@ -126,6 +128,7 @@ def live_state(controls: RunControls) -> LiveState:
         history.n_strokes,
         controls.has_ended,
         controls.notice,
+        controls.results,
     )
     return LiveState(run, None if hand is None else _state_of_hand(hand))
 

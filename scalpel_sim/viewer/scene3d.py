@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from scalpel_sim.hands.run_controls import RunResults
 from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.recording.recording import TERMS
 from scalpel_sim.scene.schema import ViewTable
@@ -120,6 +121,8 @@ class RunState(
     """Whether the page has ended it."""
     notice: str = ""
     """The message to the person."""
+    results: RunResults | None = None
+    """What it has given; None: it goes on."""
 
 
 class LiveState(NamedTuple):

@@ -12,10 +12,11 @@ import errno
 import logging
 import os
 import pickle
-import secrets
 import sys
 import threading
+from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -28,13 +29,15 @@ from scalpel_sim.viewer.colouring import Colouring, Wanted, colour_of
 from scalpel_sim.viewer.leading import Leadership, is_own_page
 from scalpel_sim.viewer.limited_server import LimitedServer
 from scalpel_sim.viewer.messages import (
+    MOST_ROWS_OF_FORCES,
     UPDATES_PER_SECOND,
+    ForceRows,
     SceneState,
     StartReply,
     ViewerSettings,
 )
-from scalpel_sim.viewer.page import PAGE_HEADERS, live_page, policy_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
+from scalpel_sim.viewer.site import PageRequest, ReplayRequest, Site
 
 LOOPBACK = "127.0.0.1"
 """The only address that is listened on: no other machine can see the run or slow it down."""
@@ -56,14 +59,6 @@ RELOAD = '{"reload":true}'
 LAST_STATE_TIMEOUT = 1.0
 """Time for the pages to draw the last state before the process ends [s]."""
 
-_CAPTION = (
-    "Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact forces, "
-    "magnified thirty times. "
-)
-_HOW_TO_LOOK = "Drag to turn the view, scroll to zoom."
-_HOW_TO_LEAD = "Drag with the right button to turn the view."
-"""Text below the heading of the live page."""
-
 MOST_PAGES = 16
 """Pages at most that are shown the run at once."""
 
@@ -77,9 +72,6 @@ SECONDS_TO_ANSWER = 10.0
 LARGEST_MESSAGE = 1 << 14
 """Largest message of a page [byte]: commands have some hundred."""
 
-N_BYTES_OF_TOKEN = 32
-"""Random bytes in the token of a page that controls its run: nobody guesses it."""
-
 
 class NewestState:
     """The newest scene state that came through the pipe. Older states are dropped.
@@ -91,6 +83,7 @@ class NewestState:
     def __init__(self, settings: ViewerSettings) -> None:
         self.shown: tuple[ViewerSettings, SceneState | None] = (settings, None)
         """The run that is shown, and its state."""
+        self._forces: deque[tuple[float, ...]] = deque(maxlen=MOST_ROWS_OF_FORCES)
         self.has_ended = threading.Event()
         self.on_change: Callable[[], object] = lambda: None
         """Called by the thread that reads, after each state and at the end."""
@@ -100,12 +93,19 @@ class NewestState:
         try:
             while True:
                 message = pickle.load(pipe)
+                if isinstance(message, ForceRows):
+                    self._forces.extend(message.rows)
+                    continue
                 begins = isinstance(message, ViewerSettings)
                 self.shown = (message, None) if begins else (self.shown[0], message)
                 self.on_change()
         except (EOFError, pickle.UnpicklingError):  # closed, or cut off inside a pickle
             self.has_ended.set()
             self.on_change()
+
+    def take_forces(self) -> list[tuple[float, ...]]:
+        """Return the rows of forces that have come since the last call."""
+        return [self._forces.popleft() for _ in range(len(self._forces))]
 
 
 class OpenPages:
@@ -120,11 +120,13 @@ class OpenPages:
         self._opening: bytes | None = None
         self._newest: bytes | None = None
         self._shown: SceneState | None = None
+        self._forces: deque[tuple[float, ...]] = deque(maxlen=MOST_ROWS_OF_FORCES)
         self._pages: set[PageSocket] = set()
 
     def begin(self, packets: ScenePackets) -> None:
         """Reload all pages, to show another run."""
         self._packets, self._opening, self._newest = packets, None, None
+        self._forces.clear()
         for page in list(self._pages):
             page.say(RELOAD)
 
@@ -141,6 +143,12 @@ class OpenPages:
         for page in list(self._pages):
             self.send_newest(page)
 
+    def add_forces(self, rows: list[tuple[float, ...]]) -> None:
+        """Add rows of forces to what each page gets with its next state."""
+        self._forces.extend(rows)
+        for page in self._pages:
+            page.forces.extend(rows)
+
     @property
     def are_too_many(self) -> bool:
         """Whether there may be no more pages."""
@@ -149,6 +157,7 @@ class OpenPages:
     def add(self, page: "PageSocket") -> None:
         """Show the run to a page that was opened."""
         self._pages.add(page)
+        page.forces.extend(self._forces)
         if self._opening is not None:
             page.send(self._opening)
         self.send_newest(page)
@@ -161,6 +170,9 @@ class OpenPages:
         """Send the newest packet to a page that has drawn all packets before it."""
         if self._newest is not None and page.n_undrawn == 0 and page.last is not self._newest:
             page.last = self._newest
+            if page.forces:
+                page.say(msgspec.json.encode({"forces": list(page.forces)}).decode())
+                page.forces.clear()
             page.send(self._newest)
 
     async def wait_until_drawn(self) -> None:
@@ -183,6 +195,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._leading = leading
         self.n_undrawn = 0
         self.last: bytes | None = None
+        self.forces: deque[tuple[float, ...]] = deque(maxlen=MOST_ROWS_OF_FORCES)
         self._n_unsent = 0
 
     def open(self, *_: str, **__: str) -> None:
@@ -245,58 +258,6 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             sending.exception()  # the page is gone, and `on_close` knows
 
 
-class Site:
-    """The document of the page, and who may control the run that it shows.
-
-    Args:
-        settings: Those of the first run.
-
-    Raises:
-        RunError: meshcat's viewer was not found.
-    """
-
-    def __init__(self, settings: ViewerSettings) -> None:
-        self._token: str | None = None
-        self.leading: Leadership | None = None
-        """Which page controls the run; None: none does."""
-        if settings.has_controls:
-            self._token = secrets.token_urlsafe(N_BYTES_OF_TOKEN)
-            self.leading = Leadership(self._token, _print_line)
-        self.begin(settings)
-
-    def begin(self, settings: ViewerSettings) -> None:
-        """Serve the page of a run."""
-        how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
-        self.document = live_page(
-            settings.title,
-            _CAPTION + how,
-            self._token,
-            is_led=settings.is_led,
-            choices=settings.choices,
-        )
-
-
-class PageRequest(tornado.web.RequestHandler):
-    """A browser's request for the page."""
-
-    def initialize(self, site: Site) -> None:
-        """Set what has the document to serve; called by tornado."""
-        self._site = site
-
-    def set_default_headers(self) -> None:
-        """Set the headers of every answer; called by tornado."""
-        for name, value in PAGE_HEADERS.items():
-            self.set_header(name, value)
-
-    def get(self) -> None:
-        """Send the page."""
-        # Not every browser takes 'self' for a web socket. Another page must not show this one in a
-        # frame, and have its visitor click there.
-        policy = policy_of(self._site.document, f"'self' ws://{self.request.host}")
-        self.set_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
-        self.write(self._site.document)
-
-
 async def serve(newest: NewestState) -> None:
     """Serve scene states until the input has ended. Prints the `StartReply` first."""
     settings, _ = newest.shown
@@ -305,7 +266,7 @@ async def serve(newest: NewestState) -> None:
     newest.on_change = lambda: loop.call_soon_threadsafe(has_changed.set)
     has_changed.set()  # what came before it was set
     try:
-        site = Site(settings)
+        site = Site(settings, _print_line)
     except RunError as error:
         _print_line(StartReply(error=str(error)))
         return
@@ -320,7 +281,11 @@ async def serve(newest: NewestState) -> None:
             settings = begun
             site.begin(settings)
             open_pages.begin(_packets_of(settings))
+        open_pages.add_forces(newest.take_forces())
         open_pages.show(state)
+        if state is not None and state.live is not None and state.live.run.results is not None:
+            replay = state.live.run.results.replay
+            site.replay = Path(replay) if replay else None
         if has_ended:
             break
         await has_changed.wait()
@@ -351,6 +316,7 @@ def _start(site: Site, open_pages: OpenPages, port: int | None) -> StartReply:
         OWN_NAMES,
         [
             (r"/", PageRequest, {"site": site}),
+            (r"/replay", ReplayRequest, {"site": site}),
             (
                 r"/frames",
                 PageSocket,

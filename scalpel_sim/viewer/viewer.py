@@ -1,12 +1,14 @@
 """The live viewer: a web page that follows a run, served by another process."""
 
 import contextlib
+import math
 import os
 import pickle
 import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import IO, TYPE_CHECKING, cast
 
@@ -20,8 +22,10 @@ from scalpel_sim.hands.commands import Release, command_of
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.colouring import wanted_of
 from scalpel_sim.viewer.messages import (
+    MOST_ROWS_OF_FORCES,
     NO_VALUES,
     UPDATES_PER_SECOND,
+    ForceRows,
     PageControls,
     SceneState,
     StartReply,
@@ -107,6 +111,7 @@ class Viewer:
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
         self._waiting: SceneState | None = None
+        self._forces: deque[tuple[float, ...]] = deque(maxlen=MOST_ROWS_OF_FORCES)
         self._is_closed = False
         self._listener: threading.Thread | None = None
         self.wanted: frozenset[SurfaceQuantity] = frozenset()
@@ -142,6 +147,15 @@ class Viewer:
         is_seen = self.is_running or (self._scene is not None and self._scene.is_drawn)
         return passed >= 1.0 / UPDATES_PER_SECOND and is_seen
 
+    def add_forces(self, time: float, *newtons: float) -> None:
+        """Plot the forces of a frame, with the next state that is shown.
+
+        Args:
+            time: Simulated time [s].
+            newtons: Size of the force on the blade, and on each grasper [N].
+        """
+        self._forces.append((time, *newtons))
+
     def show(
         self,
         surface: Surface,
@@ -160,6 +174,9 @@ class Viewer:
             values: The quantities `wanted`, at the vertices of the surface, SI.
         """
         self._last_shown = time.monotonic()
+        if readings is not None:
+            on_graspers = (force for _, force in readings.hands)
+            self.add_forces(readings.time, math.hypot(*readings.force), *on_graspers)
         with self._changed:
             state = self._waiting = SceneState(surface, body_poses, readings, live, values)
             self._changed.notify()
@@ -193,6 +210,7 @@ class Viewer:
         settings = _settings_of(model, title, frame, views, controls)
         with self._changed:
             self._settings, self._waiting = settings, None
+            self._forces.clear()
             self._changed.notify()
 
     def close(self) -> None:
@@ -229,6 +247,9 @@ class Viewer:
                         message, self._waiting = self._waiting, None
                 if message is None:
                     break
+                if isinstance(message, SceneState) and self._forces:
+                    rows = [self._forces.popleft() for _ in range(len(self._forces))]
+                    self._pipe.write(pickle.dumps(ForceRows(rows), protocol=5))
                 self._pipe.write(pickle.dumps(message, protocol=5))
                 self._pipe.flush()
         except OSError:  # the process has ended

@@ -74,7 +74,7 @@ def live_page(
     if token is None:
         return _page(title, caption, [*scripts, "force_plot.js", "live.js"])
     bars, panels = ["run"], []
-    scripts.append("run.js")
+    scripts += ["results.js", "run.js"]
     if is_led:
         bars.insert(0, "hand")
         scripts += [

@@ -4,7 +4,6 @@
 const element = (id) => document.getElementById(id);
 
 let lastReadings = null;
-let onReadings = () => {}; // where they are plotted
 
 function showReadings(readings) {
     lastReadings = readings;
@@ -15,7 +14,6 @@ function showReadings(readings) {
     element("parts").textContent = `${readings.parts.map((part) => part.toFixed(2)).join(" · ")} N`;
     showHands(readings.hands);
     showEnergies(readings.energies);
-    onReadings(readings);
     element("area").textContent = `${(readings.cut_area * 1e6).toFixed(0)} mm²`;
     element("tetrahedra").textContent = readings.tetrahedra.toLocaleString("en");
 }
@@ -50,6 +48,11 @@ function showEnergies(energies) {
 window.addEventListener("error", (event) => {
     element("status").textContent = `This browser cannot draw the scene: ${event.message}`;
 });
+
+// Until the first picture of the tissue is drawn, the page says that it loads.
+function showLoaded() {
+    element("loading").hidden = sceneView.tissue.size > 0;
+}
 
 // A choice of cameras, where there are several.
 function offerCameras(cameras) {

@@ -17,10 +17,15 @@ class ForcePlot {
         element("readings").append(this.canvas);
     }
 
-    // After an undo the time is an earlier one, and what came later did not happen.
-    add({ time, newtons, hands }) {
-        this.rows = this.rows.filter(([then]) => then < time && then > time - SECONDS_SHOWN);
-        this.rows.push([time, newtons, ...hands.map((hand) => hand.newtons)]);
+    // All rows since the last picture. After an undo the time is an earlier one, and what came later did
+    // not happen.
+    add(rows) {
+        for (const row of rows) {
+            while (this.rows.length > 0 && this.rows[this.rows.length - 1][0] >= row[0]) this.rows.pop();
+            this.rows.push(row);
+        }
+        const first = this.rows[this.rows.length - 1][0] - SECONDS_SHOWN;
+        this.rows.splice(0, this.rows.findIndex(([time]) => time > first));
         this.draw();
     }
 
@@ -28,7 +33,7 @@ class ForcePlot {
         const { width, height } = this.canvas;
         const context = this.canvas.getContext("2d");
         const now = this.rows[this.rows.length - 1][0];
-        const peak = Math.max(LOWEST_PEAK, ...this.rows.flatMap(([, ...forces]) => forces));
+        const peak = this.rows.reduce((most, [, ...forces]) => Math.max(most, ...forces), LOWEST_PEAK);
         const x = (time) => width - 6 - (width - 12) * (now - time) / SECONDS_SHOWN;
         const y = (force) => height - 6 - (height - 34) * force / peak;
         context.clearRect(0, 0, width, height);

@@ -8,7 +8,6 @@ const run = typeof Run === "undefined" ? null : new Run(sceneView);
 const hand = typeof Hand === "undefined" ? null : new Hand(sceneView, run);
 
 const forcePlot = new ForcePlot();
-onReadings = (readings) => forcePlot.add(readings);
 
 let openSocket = null;
 
@@ -35,6 +34,7 @@ function follow() {
         if (typeof message.data === "string") {
             const said = JSON.parse(message.data);
             if (said.reload) location.reload();
+            else if (said.forces) forcePlot.add(said.forces);
             else run.onLeading(said);
             return;
         }
@@ -43,6 +43,7 @@ function follow() {
         element("wireframe").checked = sceneView.wireframe;
         afterDrawing((duration) => {
             coarseness.note(duration);
+            showLoaded();
             if (socket.readyState === WebSocket.OPEN) socket.send("drawn");
         });
     };

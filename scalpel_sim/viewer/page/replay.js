@@ -144,7 +144,9 @@ async function start() {
     for (const script of packed) {
         frames.push(keepGeometries(await unpack(script)));
         script.remove();
-        if (frames.length === 1) viewer.handle_command(frames[0]);
+        if (frames.length > 1) continue;
+        viewer.handle_command(frames[0]);
+        showLoaded();
     }
     for (const frame of frames) { // the scale is that of the whole run
         sceneView.colours.setTops(frame.commands.find(({ type }) => type === "set_scales").tops);
@@ -155,4 +157,6 @@ async function start() {
     player.play();
 }
 
-start().catch((error) => { element("status").textContent = `This replay cannot be shown: ${error}`; });
+start().catch((error) => {
+    element("loading").hidden = true;
+    element("status").textContent = `This replay cannot be shown: ${error}`; });

@@ -6,6 +6,7 @@ const SLOWER = 0.95; // factor of real time, of what was requested, below which 
 
 const NO_STATE = {
     paused: false, rate: 1, real_time: 1, can_go_back: false, strokes: 0, ended: false, notice: "",
+    results: null,
 };
 
 class Run {
@@ -22,9 +23,11 @@ class Run {
         element("step").addEventListener("click", () => this.step());
         element("rate").addEventListener("change", (event) => this.setRate(Number(event.target.value)));
         element("undo").addEventListener("click", () => this.undo());
+        this.results = new Results(this);
         element("reset").addEventListener("click", () => this.ask({ type: "reset" }));
         element("end").addEventListener("click", () => this.ask({ type: "end" }));
         document.querySelector("footer").before(element("notice"));
+        element("panels").before(element("results"));
         element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
         window.addEventListener("keydown", (event) => this.onKey(event));
         this.showControls();
@@ -100,18 +103,22 @@ class Run {
     }
 
     showControls() {
-        const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes, ended, notice } =
+        const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes, ended, notice, results } =
             this.state || NO_STATE;
         for (const id of ["pause", "step", "rate", "end"]) element(id).disabled = !this.leads || ended;
         element("pause").textContent = paused ? "continue" : "pause";
         element("rate").value = String(rate);
         element("undo").disabled = !this.leads || ended || strokes === 0;
-        element("reset").disabled = !this.leads || ended || !canGoBack;
+        const mayRepeat = ended && results !== null && this.next !== null;
+        element("reset").textContent = ended ? "again" : "reset";
+        element("reset").title = ended ? "the same run from its start" : "back to the start";
+        element("reset").disabled = !this.leads || (ended ? !mayRepeat : !canGoBack);
         element("take-over").hidden = this.leads || this.socket === null;
         element("pace").textContent = ended ? "ended" : paused ? "paused" : paceOf(realTime, rate);
         element("notice").textContent = notice;
         element("notice").hidden = notice === "";
         if (this.next) this.next.showControls();
+        this.results.show(results);
     }
 }
 

@@ -1,8 +1,12 @@
 """A visitor stops the time of a run in the live page, slows it down, and goes back."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from scalpel_sim.runs.file_names import REPLAY, SUMMARY
 from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView
 from tests.scalpel_sim.hands.test_driven_page import drag, tip, until_it_rests
 from tests.support.browser import new_tab
@@ -50,6 +54,61 @@ def test_a_run_pauses_goes_on_by_steps_and_in_slow_motion(scripted):
     tab.keyboard.press("k")
     tab.wait_for_function(f"!run.isPaused && {TIME} > {before + 0.02:.2f}")
     tab.wait_for_function("run.state.real_time < 0.11")
+
+
+@pytest.mark.browser
+def test_the_force_of_each_frame_reaches_the_plot_also_where_pictures_are_few(scripted):
+    tab = scripted
+    tab.wait_for_function(f"{TIME} > 0.2")
+    times = tab.evaluate("forcePlot.rows.map(([time]) => time)")
+    assert len(times) > 100
+    assert np.allclose(np.diff(times), 1e-3, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.browser
+def test_a_page_says_that_it_loads_until_the_tissue_is_drawn(scripted):
+    document = scripted.evaluate("fetch('/').then((answer) => answer.text())")
+    assert '<p id="loading" role="status">' in document
+    scripted.wait_for_function("sceneView.tissue.size > 0")
+    scripted.wait_for_selector("#loading", state="hidden")
+
+
+@pytest.mark.browser
+def test_a_run_that_has_ended_shows_its_results_gives_its_replay_and_is_done_again(
+    tmp_path, browser
+):
+    with LiveView("grid2", tmp_path / "out", "--seconds", "0.2") as view:
+        tab = new_tab(browser)
+        tab.set_viewport_size({"width": 700, "height": 600})
+        tab.goto(view.url)
+        tab.wait_for_selector("#results")
+        labels, values = (
+            tab.locator(f"#figures {each}").all_inner_texts() for each in ("dt", "dd")
+        )
+        figures = dict(zip(labels, values, strict=True))
+        summary = json.loads((view.folder / SUMMARY).read_text())
+        assert figures["force, peak"] == f"{summary['force_peak_n']:.2f} N"
+        assert figures["pieces"] == str(summary["pieces"])
+        assert tab.inner_text("#folder") == str(view.folder)
+        with tab.expect_download() as download:
+            tab.click("#save-replay")
+        assert download.value.suggested_filename == "grid2-straight-stroke-replay.html"
+        assert Path(download.value.path()).read_bytes() == (view.folder / REPLAY).read_bytes()
+        with tab.expect_popup() as opened:
+            tab.click("#open-replay")
+        opened.value.wait_for_function("typeof player !== 'undefined' && player.shown >= 0")
+        opened.value.close()
+        policy = (
+            "fetch(`/replay${run.query}`).then((a) => a.headers.get('Content-Security-Policy'))"
+        )
+        assert "sandbox allow-scripts" in tab.evaluate(policy), "it is of no origin: it cannot lead"
+        assert tab.evaluate("fetch('/replay?token=no').then((answer) => answer.status)") == 403
+        assert tab.inner_text("#offers button >> nth=0") == "lead the blade yourself"
+        assert tab.inner_text("#reset") == "again"
+        tab.click("#reset")
+        tab.wait_for_function("element('folder').textContent.endsWith('out-2')")
+        tab.close()
+        assert tab.failures == []
 
 
 @pytest.mark.browser

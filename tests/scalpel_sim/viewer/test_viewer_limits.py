@@ -89,7 +89,7 @@ class ClosedPage:
     """A page that was closed, which is noticed when it is sent something."""
 
     def __init__(self, pages):
-        self._pages, self.n_undrawn, self.last = pages, 0, None
+        self._pages, self.n_undrawn, self.last, self.forces = pages, 0, None, []
         pages.add(self)
 
     def send(self, packet):
