@@ -26,6 +26,7 @@ HELPS = (
     "explain",
     "serve",
     "spacemouse",
+    "crtk",
     "key",
     "materials",
     "figure",

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
+from scalpel_sim.cli.crtk_command import crtk
 from scalpel_sim.cli.doctor_command import doctor
 from scalpel_sim.cli.explain_command import explain
 from scalpel_sim.cli.new_command import new
@@ -139,6 +140,7 @@ def _run(
 app.command(view)
 app.command(explain)
 app.command(spacemouse)
+app.command(crtk)
 
 
 @app.command(name="serve")
