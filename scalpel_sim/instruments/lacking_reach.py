@@ -7,11 +7,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.arm.damped_least_squares import (
+from scalpel_sim.arm.chain_kinematics import (
     LONGEST_STEP,
     NEAR_PLACE,
     NEAR_TURN,
-    DampedLeastSquares,
+    ChainKinematics,
     Miss,
 )
 from tissue import BladeSegment, FloatArray
@@ -76,7 +76,7 @@ def place_of_arm(table: str, base: TissueFrame) -> PlaceInScene:
 
 
 def what_it_lacks(
-    solver: DampedLeastSquares,
+    solver: ChainKinematics,
     times: FloatArray,
     poses: Sequence[BladeSegment],
     place: PlaceInScene,
@@ -101,7 +101,7 @@ def what_it_lacks(
 
 
 def _place_in_reach(
-    solver: DampedLeastSquares, poses: Sequence[BladeSegment], place: PlaceInScene
+    solver: ChainKinematics, poses: Sequence[BladeSegment], place: PlaceInScene
 ) -> FloatArray | None:
     """Return a `pos` with which all poses are reached, not far from its own; None: none is known.
 
@@ -121,7 +121,7 @@ def _place_in_reach(
 
 
 def _shift_into_reach(
-    solver: DampedLeastSquares, start: FloatArray, poses: Sequence[BladeSegment]
+    solver: ChainKinematics, start: FloatArray, poses: Sequence[BladeSegment]
 ) -> FloatArray | None:
     """Return by how much to move poses so that each is reached, as little as is found [m].
 
@@ -160,7 +160,7 @@ def _shift_into_reach(
 
 
 def _step(
-    solver: DampedLeastSquares,
+    solver: ChainKinematics,
     qpos: FloatArray,
     rows: FloatArray,
     wanted: FloatArray,
@@ -194,7 +194,7 @@ def _limited(step: FloatArray, n_joints: int) -> FloatArray:
 
 
 def _unreachable(
-    solver: DampedLeastSquares,
+    solver: ChainKinematics,
     times: FloatArray,
     poses: Sequence[BladeSegment],
     place: PlaceInScene,

@@ -15,7 +15,7 @@ import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.arm import DrivenArm
-from scalpel_sim.arm.damped_least_squares import DampedLeastSquares
+from scalpel_sim.arm.chain_kinematics import ChainKinematics
 from scalpel_sim.arm.firm_hand import firm_impedance
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.model_file import spec_of_file
@@ -162,7 +162,7 @@ def move_to_start(
             it would, or which motion the arm lacks.
     """
     times, poses = _watched(stroke, frame)
-    solver = DampedLeastSquares(arm)
+    solver = ChainKinematics(arm)
     found = solver.find(poses)
     if not found.is_whole:
         lacks = what_it_lacks(solver, times, poses, place or place_of_tissue(frame))
@@ -192,7 +192,7 @@ def move_within(
     """
 
     def move(tour: Stroke, shares: FloatArray) -> None:
-        found = DampedLeastSquares(arm).find(_watched(tour, frame)[1])
+        found = ChainKinematics(arm).find(_watched(tour, frame)[1])
         if not found.is_whole:
             if shares.max() <= SMALLEST_SHARE:  # the last that is tried: say what it lacks
                 move_to_start(arm, tour, frame, place)
@@ -200,7 +200,7 @@ def move_within(
         arm.reset(found.first)
 
     def reaches(_: None, tour: Stroke) -> bool:
-        solver = DampedLeastSquares(arm)
+        solver = ChainKinematics(arm)
         return solver.follow(solver.starts()[0], _watched(tour, frame)[1]).is_whole
 
     middle = 0.5 * (start.tip + start.heel)

@@ -1,6 +1,7 @@
 """An arm of the user's own in a scene: a robot with the kinematics of a UR5e, from MJCF alone."""
 
 import re
+import sys
 from pathlib import Path
 
 import mujoco
@@ -88,6 +89,12 @@ def test_inverse_kinematics_has_the_edge_at_the_start_of_the_stroke(place):
     np.testing.assert_allclose(found.tip, wanted.tip, atol=1e-3)
     np.testing.assert_allclose(found.heel, wanted.heel, atol=1e-3)
     assert found.forward @ wanted.forward > 0.9999
+
+
+def test_without_mink_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mink", None)  # as if it were not there
+    with pytest.raises(UsageError, match=r"needs mink .*: pip install 'scalpel-sim\[arms\]'"):
+        move_to_start(robot(), stroke_to(0.0, 0.4, 0.1), TissueFrame())
 
 
 def test_sensors_and_states_of_actuators_go_with_them(tmp_path):

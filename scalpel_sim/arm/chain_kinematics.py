@@ -1,16 +1,19 @@
 """Configurations of any chain of hinges and slides that have the edge at a pose.
 
-Damped least squares from several starts. What no joint moves is left as it is: chains may have any
-number of joints, and lack some of the six motions.
+Steps are those of mink: a quadratic program within the ranges of the joints (the extra `arms`).
+They begin from several configurations, always the same. What no joint moves is left as it is:
+chains may have any number of joints, and lack some of the six motions.
 """
 
 from collections.abc import Sequence
+from types import ModuleType
 from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from scalpel_sim.arm.arm import DrivenArm
+from scalpel_sim.errors import UsageError
 from tissue import BladeSegment, BoolArray, FloatArray
 
 NEAR_PLACE: Final = 5e-4
@@ -21,9 +24,13 @@ _ITERATIONS: Final = 200
 """Steps for a pose, at most."""
 LONGEST_STEP: Final = 0.2
 """How far a joint moves in a step, at most [rad, m]: the Jacobian is that of where it is."""
+_STILL: Final = 1e-5
+"""Step below which joints have come to rest [rad, m]: no motion brings the edge nearer."""
 _DAMPING: Final = 1e-3
-"""Damping of the least squares, over the largest square of a singular value: near a singular
-configuration joints move little rather than wildly."""
+"""Damping of a step, over the square of what it lacks [m2]: near a singular configuration joints
+move little rather than wildly, and close to the pose nothing slows them."""
+_LEAST_DAMPING: Final = 1e-10
+"""Damping of all steps [m2]: joints that do not carry the edge stay."""
 _STARTS: Final = 24
 """Configurations from which the first pose is sought: the one that the model has, and random ones,
 always the same."""
@@ -72,19 +79,26 @@ class Followed(NamedTuple):
         return self.miss.size <= 1.0
 
 
-class DampedLeastSquares:
+class ChainKinematics:
     """Finds configurations of an arm, in data of its own.
 
     Args:
         arm: The arm. The configuration where it is is tried first.
+
+    Raises:
+        UsageError: mink is not installed.
     """
 
     def __init__(self, arm: DrivenArm) -> None:
         self._model = arm.model
-        self._data = mujoco.MjData(arm.model)
+        self._mink = mink = _loaded()
+        self._configuration = mink.Configuration(arm.model)
+        self._data = self._configuration.data
         self._low, self._high = arm.ranges()
         self._site = arm.hand.edge
         self._at_first = np.array(arm.data.qpos)
+        self._task = mink.FrameTask(int(self._site), "site", 1.0, _LEVER, lm_damping=_DAMPING)
+        self._limits = [mink.ConfigurationLimit(arm.model, gain=1.0)]
 
     def starts(self) -> list[FloatArray]:
         """Return configurations to start from. Joints that do not carry the edge stay."""
@@ -125,13 +139,20 @@ class DampedLeastSquares:
 
     def solve(self, qpos: FloatArray, pose: BladeSegment) -> tuple[FloatArray, Miss]:
         """Return a configuration near `qpos` that has the edge at a pose, and what it lacks."""
+        target = np.eye(4)
+        target[:3, :3], target[:3, 3] = _wanted(pose)
+        self._task.set_target(self._mink.SE3.from_matrix(target))
         for i in range(_ITERATIONS):
-            miss, jacobian = self.lacks(qpos, pose)
+            self._configuration.update(qpos)
+            miss = self._miss(pose)
             if miss.size < 0.1 or i == _ITERATIONS - 1:
                 break
-            square = jacobian @ jacobian.T
-            square += _DAMPING * np.linalg.norm(square, 2) * np.eye(6)
-            step = jacobian.T @ np.linalg.solve(square, miss.weighed)
+            try:
+                step = self._step()
+            except self._mink.NoSolutionFound:
+                break
+            if np.abs(step).max() < _STILL:
+                break
             step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
             qpos = self.within_ranges(qpos + step)
         return qpos, miss
@@ -143,10 +164,7 @@ class DampedLeastSquares:
             What it lacks, and the Jacobian of the edge as `Miss.weighed`, of shape (6, n_joints).
         """
         position, rotation = self._place(qpos)
-        wanted = _axes(pose.tip - pose.heel, pose.forward)
-        off = 0.5 * (pose.tip + pose.heel) - self._data.site_xpos[self._site]
-        now = self._data.site_xmat[self._site].reshape(3, 3)
-        return Miss(off, _turn(now, wanted)), np.vstack([position, _LEVER * rotation])
+        return self._miss(pose), np.vstack([position, _LEVER * rotation])
 
     def within_ranges(self, qpos: FloatArray) -> FloatArray:
         """Return the configuration nearest to `qpos` that the joints can take."""
@@ -167,13 +185,44 @@ class DampedLeastSquares:
 
     def _place(self, qpos: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Put the joints somewhere; return the Jacobians of place and rotation of the edge."""
-        model, data = self._model, self._data
-        data.qpos[:] = qpos
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        position, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        mujoco.mj_jacSite(model, data, position, rotation, self._site)
+        self._configuration.update(qpos)
+        position, rotation = np.zeros((2, 3, self._model.nv))
+        mujoco.mj_jacSite(self._model, self._data, position, rotation, self._site)
         return position, rotation
+
+    def _miss(self, pose: BladeSegment) -> Miss:
+        """Return what the edge lacks to a pose, from where the joints are."""
+        axes, middle = _wanted(pose)
+        now = self._data.site_xmat[self._site].reshape(3, 3)
+        return Miss(middle - self._data.site_xpos[self._site], _turn(now, axes))
+
+    def _step(self) -> FloatArray:
+        """Return a step of the joints from where they are towards the target of the task."""
+        step = self._mink.solve_ik(
+            self._configuration,
+            [self._task],
+            dt=1.0,
+            solver="daqp",
+            damping=_LEAST_DAMPING,
+            limits=self._limits,
+        )
+        return np.asarray(step)
+
+
+def _loaded() -> ModuleType:
+    """Return mink.
+
+    Raises:
+        UsageError: it cannot be loaded.
+    """
+    try:
+        import mink
+    except ImportError as cause:
+        raise UsageError(
+            f"an arm of your own needs mink for its inverse kinematics, which cannot be loaded "
+            f"({cause}): pip install 'scalpel-sim[arms]'"
+        ) from cause
+    return mink
 
 
 def _projector(directions: FloatArray) -> FloatArray:
@@ -183,12 +232,13 @@ def _projector(directions: FloatArray) -> FloatArray:
     return np.asarray(used @ used.T)
 
 
-def _axes(edge: FloatArray, forward: FloatArray) -> FloatArray:
-    """Return axes as columns whose +y is along the edge and whose -z cuts."""
+def _wanted(pose: BladeSegment) -> tuple[FloatArray, FloatArray]:
+    """Return axes as columns whose +y is along an edge and whose -z cuts, and its middle [m]."""
+    edge, forward = pose.tip - pose.heel, pose.forward
     y = edge / np.linalg.norm(edge)
     z = -(forward - (forward @ y) * y)
     z /= np.linalg.norm(z)
-    return np.stack([np.cross(y, z), y, z], axis=1)
+    return np.stack([np.cross(y, z), y, z], axis=1), 0.5 * (pose.tip + pose.heel)
 
 
 def _turn(now: FloatArray, wanted: FloatArray) -> FloatArray:
