@@ -1,7 +1,6 @@
-"""Delays between processes: a step over TCP, a device that leads the blade, the page of a mouse."""
+"""Delays between processes: a step over TCP, and the page of a mouse."""
 
 import contextlib
-import math
 import subprocess
 import sys
 import tempfile
@@ -10,13 +9,12 @@ from collections.abc import Callable
 from functools import partial
 from operator import methodcaller
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.timing import TurnWatch, time_calls
-from bridge import DeviceClient, DeviceState, InProcessLink, LinkError, TcpLink, TissueLink, serve
-from scalpel_sim.validate.speed.measurements import COUNTED, WALL, BenchmarkResult
+from bridge import InProcessLink, TcpLink, TissueLink, serve
+from scalpel_sim.validate.speed.measurements import BenchmarkResult
 from scalpel_sim.validate.speed.tables import Rows
 from scalpel_sim.validate.speed.watch import SILENT
 from tissue import BladeSegment, BladeSweep, FloatArray, Tissue, block
@@ -28,30 +26,10 @@ _N_WARM_UP = 200
 _SIDE = 0.01
 """Side of the cell [m]."""
 
-_PERIOD = 1e-3
-"""Period of the device [s]."""
-_REACH = np.array([0.004, 0.03, 0.008])
-"""Amplitude of the stylus along x, y and z [m]."""
-_RATES = np.array([1.3, 0.7, 2.1])
-"""How fast it goes to and fro [rad/s]."""
-_SPURT = 10.0
-"""Every so many seconds the stylus goes at ten times the speed for a tenth of a second [s]."""
-_ROUNDING = 1e-6
-"""Share by which a limit may be passed: what the digits of the record leave."""
-_STILL = np.array([1.0, 0.0, 0.0, 0.0])
-"""A stylus that is not turned."""
-
 _N_MOVES = 400
 _SECONDS_PER_MOVE = 0.015
 _SETTLING = 2.0
 """Until the page has found how coarsely it has to draw [s]."""
-
-_MISBEHAVIOUR: dict[str, Callable[[DeviceClient], object]] = {
-    "silence": lambda client: None,
-    "NaN": lambda client: client.servo_cp(np.full(3, np.nan), _STILL),
-    "a jump of 10 m": lambda client: client.servo_cp(np.array([0.0, 10.0, 0.0]), _STILL),
-}
-"""Faults of a device that has led."""
 
 _ABOUT_TCP = (
     "The tissue is one cell in a second process, as with `scalpel-sim serve`. Link alone: the "
@@ -126,104 +104,6 @@ def _draw_in(link: TissueLink, pose: BladeSegment) -> None:
         after = pose._replace(tip=pose.tip + shift, heel=pose.heel + shift)
         link.step(BladeSweep(before or after, after), 1e-3)
         before = after
-
-
-def device_link(scene: str = "organ", /, *, seconds: float = 60.0) -> BenchmarkResult:
-    """Time the link of a device that leads the blade, and count what passes a limit.
-
-    A fake device in this process leads the blade of `scalpel-sim run --hand device` in another one,
-    a thousand poses a second: to and fro through the body, in bends, with turns, and now and then
-    faster than the blade may. In the record of the run no step of the blade may be faster than its
-    limits.
-
-    Args:
-        scene: Scene.
-        seconds: Wall time [s].
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        command = ["run", scene, "--hand", "device", "--listen", "127.0.0.1:0", "--quiet"]
-        run = subprocess.Popen(
-            [sys.executable, "-m", "scalpel_sim", *command, "--out", folder],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert run.stderr is not None
-        address = next(line for line in run.stderr if "waiting for a device" in line).split()[-1]
-        with DeviceClient(address, period=_PERIOD) as client:
-            taken, state = _lead(client, seconds)
-            limits = client.description
-            rests = {name: _time_to_rest(client, act) for name, act in _MISBEHAVIOUR.items()}
-            client.end()
-        run.communicate()
-        stroke = np.genfromtxt(Path(folder) / "stroke.csv", delimiter=",", names=True)
-        forces = np.genfromtxt(Path(folder) / "forces.csv", delimiter=",", names=True)
-    speed, turn_rate = _fastest(stroke)
-    force = np.sqrt(sum(forces[f"force_{axis}_n"] ** 2 for axis in "xyz")).max()
-    passed = (speed > (1.0 + _ROUNDING) * limits.most_speed) + (
-        turn_rate > (1.0 + _ROUNDING) * limits.most_turn_rate
-    )
-    rows = Rows("device-link")
-    rows.times("request to reply", None, [taken])
-    for case, unit, value in (
-        *((f"until rest after {name}", "ms", 1e3 * rest) for name, rest in rests.items()),
-        (f"fastest, limit {limits.most_speed:g}", "m/s", speed),
-        (f"fastest turn, limit {limits.most_turn_rate:g}", "rad/s", turn_rate),
-        ("limits passed", "", passed),
-        ("periods missed", "", state.n_missed),
-        ("messages dropped", "", state.n_dropped),
-        ("frames limited", "", state.n_limited),
-        ("largest force", "N", force),
-        ("cut", "mm2", 1e6 * forces["cut_area_m2"][-1]),
-    ):
-        clock = WALL.name if unit == "ms" else COUNTED
-        rows.values(case, None, [float(value)], unit, clock=clock)
-    about = f"{len(taken):,} poses in {seconds:g} s, {state.time:.1f} s simulated."
-    return rows.table(scene, about)._replace(is_right=not passed)
-
-
-def _lead(client: DeviceClient, seconds: float) -> tuple[FloatArray, DeviceState]:
-    """Lead for so many seconds, and return the time of each reply [s], and the last state."""
-    state = client.measured()
-    taken, start = [], time.monotonic()
-    due, stylus, before = start, 0.0, start
-    while (now := time.monotonic()) - start < seconds:
-        is_spurt = (now - start) % _SPURT > _SPURT - 0.1
-        stylus += (10.0 if is_spurt else 1.0) * (now - before)
-        before = now
-        position = _REACH * np.sin(_RATES * stylus)
-        angle = 0.1 * math.sin(stylus)
-        orientation = np.array([math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)])
-        state = client.servo_cp(position, orientation)
-        taken.append(time.monotonic() - now)
-        due = max(due + _PERIOD, time.monotonic())
-        time.sleep(max(0.0, due - time.monotonic()))
-    return np.array(taken), state
-
-
-def _time_to_rest(client: DeviceClient, misbehave: Callable[[DeviceClient], object]) -> float:
-    """Return the wall time from the last good pose until nobody leads the blade [s]."""
-    for k in range(100):
-        client.servo_cp(np.array([0.0, 1e-5 * k, 0.0]), _STILL)
-    last = time.monotonic()
-    with contextlib.suppress(LinkError):
-        misbehave(client)
-    while client.measured().is_engaged:
-        pass
-    return time.monotonic() - last
-
-
-def _fastest(rows: np.ndarray[Any, Any]) -> tuple[float, float]:
-    """Return the highest speed of the middle of the edge [m/s], and its turn rate [rad/s]."""
-    parts = [np.stack([rows[f"{p}_{a}"] for a in "xyz"], 1) for p in ("tip", "heel", "forward")]
-    tip, heel, forward = parts
-    steps = np.diff(rows["t"])
-    along = (tip - heel) / np.linalg.norm(tip - heel, axis=1)[:, None]
-    axes = np.stack([along, forward, np.cross(along, forward)], 1)
-    middle = 0.5 * (tip + heel)
-    speeds = np.linalg.norm(np.diff(middle, axis=0), axis=1) / steps
-    # |R1 - R0| in the norm of Frobenius is 2 sqrt(2) sin(angle / 2).
-    chords = np.linalg.norm(np.diff(axes, axis=0), axis=(1, 2)) / (2.0 * math.sqrt(2.0))
-    return float(speeds.max()), float((2.0 * np.arcsin(chords) / steps).max())
 
 
 def lag(*scenes: str, width: int = 480, height: int = 360) -> BenchmarkResult:

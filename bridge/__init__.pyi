@@ -18,9 +18,14 @@ from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.virtual_coupling import Proxy as Proxy
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
 from .device.client import DeviceClient as DeviceClient
+from .device.exchange import DeviceCommand as DeviceCommand
+from .device.felt_force import BladeReport as BladeReport
+from .device.felt_force import motion_between as motion_between
 from .device.messages import CartesianPose as CartesianPose
 from .device.messages import DeviceDescription as DeviceDescription
 from .device.messages import DeviceState as DeviceState
+from .device.process import DeviceEnd as DeviceEnd
+from .device.process import DeviceProcess as DeviceProcess
 from .device.server import DEFAULT_DEVICE_PORT as DEFAULT_DEVICE_PORT
 from .device.server import DeviceServer as DeviceServer
 from .driven import GeomLoads as GeomLoads
@@ -42,6 +47,7 @@ from .tcp.server import serve as serve
 
 __all__ = [
     "ArmGeom",
+    "BladeReport",
     "Bridge",
     "CartesianPose",
     "Collisions",
@@ -51,8 +57,11 @@ __all__ = [
     "DEFAULT_HOST",
     "DEFAULT_PORT",
     "DeviceClient",
+    "DeviceCommand",
     "DeviceDescription",
+    "DeviceEnd",
     "DeviceLimits",
+    "DeviceProcess",
     "DeviceServer",
     "DeviceState",
     "Fixture",
@@ -78,6 +87,7 @@ __all__ = [
     "VirtualCoupling",
     "chosen_key",
     "compiled_arithmetic",
+    "motion_between",
     "parse_address",
     "sent_scene_name",
     "serve",

@@ -43,7 +43,8 @@ _RULES = StateRules(
             *("recording", "records", "n_frames", "pictures", "wall_seconds"),
             *("_shared", "_groups", "_rows", "samples", "_wall_times", "_start"),
         )
-    ),
+    )
+    | frozenset(f"DeviceHand.{name}" for name in ("answers", "_hold", "_n_lost", "_looked_at")),
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the
     # stroke that was recorded.
     unwritten=frozenset({"BladeInstrument.controller", "DrivenGrasper.controller"}),

@@ -30,7 +30,7 @@ class CartesianPose(NamedTuple):
 
 
 class DeviceState(NamedTuple):
-    """State of the blade that a device drives, after the last frame."""
+    """State of the blade that a device drives, after the last frame, and what is felt of it."""
 
     time: float
     """Simulated time [s]."""
@@ -39,8 +39,9 @@ class DeviceState(NamedTuple):
     measured_cp: CartesianPose
     """Where the blade is: the origin is its tip, +y points from heel to tip, -z cuts."""
     measured_cf: Wrench
-    """Wrench of the tissue on the blade, as the simulated arm feels it within its limits: force and
-    torque about the tip, world frame."""
+    """What a device that drives exerts now: the wrench of the tissue on the blade within the limits
+    of the simulated arm, continued to this moment; force and torque about the tip, world frame. As
+    measured, while none drives."""
     is_engaged: bool
     """Whether the device drives the blade now."""
     has_ended: bool
@@ -51,6 +52,10 @@ class DeviceState(NamedTuple):
     """Periods in which a device was to send a pose, and sent none."""
     n_dropped: int = 0
     """Messages that were refused, such as a pose that is not finite."""
+    stylus_distance: float = 0.0
+    """How far the stylus is from where the blade is led, since it took hold [m]."""
+    stylus_angle: float = 0.0
+    """How far it is turned from there [rad]."""
 
 
 class DeviceDescription(NamedTuple):
@@ -128,6 +133,8 @@ STATE: Message[DeviceState] = Message(
         n_limited=_Number,
         n_missed=_Number,
         n_dropped=_Number,
+        stylus_distance=FiniteFloat,
+        stylus_angle=FiniteFloat,
     ),
     "the state of the blade",
     _check_state,

@@ -33,8 +33,10 @@ stays a number that a reply has room for."""
 class DrivenBlade(Protocol):
     """The blade that a device drives."""
 
-    def servo_cp(self, pose: CartesianPose, *, holds: bool) -> None:
+    def servo_cp(self, pose: CartesianPose, *, holds: bool, period: float) -> None:
         """Drive the blade as the device has moved to a pose; without `holds` it rests.
+
+        The next one is to come after a period [s].
 
         Raises:
             ValueError: the device cannot have moved so.
@@ -54,7 +56,7 @@ class DrivenBlade(Protocol):
 
 
 class DeviceServer(SingleClientServer):
-    """Serves one device at a time, which drives a blade; it is served between two frames.
+    """Serves one device at a time, which drives a blade.
 
     What is refused, a device that leaves, and a stream that cannot be read release the blade.
 
@@ -70,10 +72,8 @@ class DeviceServer(SingleClientServer):
         LinkError: the port is in use or not allowed.
     """
 
-    # A device that does not read its replies must not make a frame wait.
+    # A device that does not read its replies must not make others wait.
     _send_seconds = 0.0
-    # Nor must one that sends too much: these are some forty poses, which take 3 ms.
-    _read_bytes = 4096
 
     def __init__(
         self,
@@ -98,9 +98,10 @@ class DeviceServer(SingleClientServer):
         while (left := until - time.monotonic()) > 0.0:
             self._serve_once(left)
 
-    def state(self) -> DeviceState:
-        """Return how the blade is, with what was counted of the devices so far."""
-        return self._driven.state()._replace(n_missed=self._n_missed, n_dropped=self._n_dropped)
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Periods without a pose, and messages that were refused, so far."""
+        return self._n_missed, self._n_dropped
 
     def _forget_client(self) -> None:
         self._stamp, self._is_refusing = None, False
@@ -125,7 +126,8 @@ class DeviceServer(SingleClientServer):
             self._driven.end()
         elif frame.kind != MessageKind.MEASURED:
             raise MessageError(f"there is no request of kind {frame.kind} where a device drives")
-        return STATE.pack(self.state())
+        state = self._driven.state()
+        return STATE.pack(state._replace(n_missed=self._n_missed, n_dropped=self._n_dropped))
 
     def _servo(self, request: ServoRequest) -> None:
         """Drive the blade, and count the periods since the last pose in which none was sent.
@@ -138,7 +140,7 @@ class DeviceServer(SingleClientServer):
             self._n_missed += max(round(pause / request.period) - 1, 0)
         self._stamp = request.stamp
         try:
-            self._driven.servo_cp(request.servo_cp, holds=request.holds)
+            self._driven.servo_cp(request.servo_cp, holds=request.holds, period=request.period)
         except ValueError as error:
             raise MessageError(str(error)) from error
         self._is_refusing = False

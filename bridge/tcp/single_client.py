@@ -50,8 +50,6 @@ class SingleClientServer(abc.ABC):
 
     _send_seconds = SEND_SECONDS
     """Longest time for a peer to read a reply [s]."""
-    _read_bytes = READ_BYTES
-    """Size of a read from a socket [byte]."""
 
     def __init__(self, served: str, host: str, port: int, key: bytes | None) -> None:
         self._served, self._key = served, key
@@ -151,7 +149,7 @@ class SingleClientServer(abc.ABC):
         if peer not in self._peers:
             return  # dropped while an earlier event was handled
         try:
-            data = peer.socket.recv(self._read_bytes)
+            data = peer.socket.recv(READ_BYTES)
         except BlockingIOError:
             return
         except OSError as error:

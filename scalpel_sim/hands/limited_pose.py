@@ -47,7 +47,11 @@ class LimitedPose:
         """Where it is [m], and how it is turned."""
         self.wanted, self.wanted_rotation = middle.copy(), rotation.copy()
         """Where it is wanted."""
-        self._workspace, self._dt = workspace, dt
+        self.dt = dt
+        """Time that passes in a frame, for speeds and for the time constant [s]."""
+        self.following_time = FOLLOWING_TIME
+        """Time constant with which it follows [s]."""
+        self._workspace = workspace
         self._is_limited = False
 
     def move(self, by: FloatArray) -> None:
@@ -68,6 +72,17 @@ class LimitedPose:
         self.wanted_rotation[:] = self.rotation
         mujoco.mju_quatIntegrate(self.wanted_rotation, _shortened(ahead, MOST_AHEAD_TURN), 1.0)
 
+    def want(self, middle: FloatArray, rotation: FloatArray) -> None:
+        """Want it at a pose, however far ahead, as near as the room allows.
+
+        Args:
+            middle: Where its middle is to be [m], shape (3,).
+            rotation: How it is to be turned (w, x, y, z).
+        """
+        np.clip(middle, *self._workspace, out=self.wanted)
+        self.wanted_rotation[:] = rotation
+        self._is_limited |= math.dist(middle.tolist(), self.wanted.tolist()) > ARRIVED
+
     def rest(self) -> None:
         """Want it to be where it is."""
         self.wanted[:] = self.middle
@@ -78,13 +93,13 @@ class LimitedPose:
         way, turn = self.wanted - self.middle, np.empty(3)
         mujoco.mju_subQuat(turn, self.wanted_rotation, self.rotation)
         distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
-        share = 1.0 - math.exp(-self._dt / FOLLOWING_TIME)
+        share = 1.0 - math.exp(-self.dt / self.following_time)
         if distance > ARRIVED:
-            most = MOST_SPEED * self._dt / distance
+            most = MOST_SPEED * self.dt / distance
             self._is_limited |= most < share
             self.middle += way * min(share, most)
         if angle > ARRIVED_TURN:
-            most = MOST_TURN_RATE * self._dt / angle
+            most = MOST_TURN_RATE * self.dt / angle
             self._is_limited |= most < share
             mujoco.mju_quatIntegrate(self.rotation, turn, min(share, most))
             mujoco.mju_normalize4(self.rotation)

@@ -96,6 +96,11 @@ class Teleoperation(abc.ABC):
         return tuple(number for each in self.instruments for number in each.numbers)
 
     @property
+    def stylus_distance(self) -> float:
+        """How far the stylus of a device is from where the blade is led [m]; 0 without one."""
+        return 0.0
+
+    @property
     def tip(self) -> FloatArray:
         """Where the chosen instrument is led [m], world frame, shape (3,)."""
         return self.instruments[self.chosen].tip

@@ -1,5 +1,6 @@
 """A run whose blade a device leads."""
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +10,8 @@ from bridge import (
     DEFAULT_DEVICE_PORT,
     DEFAULT_HOST,
     DeviceDescription,
-    DeviceServer,
+    DeviceEnd,
+    DeviceProcess,
     chosen_key,
     parse_address,
 )
@@ -24,9 +26,10 @@ from scalpel_sim.runs.options import DeviceOptions
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import perform
 from scalpel_sim.scene.checks import LONGEST_RUN
+from scalpel_sim.simulation import Simulation
 
-SECONDS_PER_WAIT = 0.02
-"""Time between two checks whether a waiting run is to end [s]."""
+SECONDS_PER_WAIT = 0.002
+"""Time between two looks whether a device has taken hold [s]."""
 
 LONGEST_WATCHDOG = 10.0
 """Longest time of the watchdog [s]: a blade that is led for longer by nobody is a mistake."""
@@ -36,7 +39,7 @@ class DeviceRun(NamedTuple):
     """A run that waits for a device."""
 
     hand: DeviceHand
-    server: DeviceServer
+    answers: DeviceProcess
     controls: RunControls
     """They have that hand."""
 
@@ -64,7 +67,7 @@ def check_device_options(device: DeviceOptions, *, is_led: bool) -> None:
 def device_run(
     prepared: PreparedRun, device: DeviceOptions, commands: deque[Command] | None = None
 ) -> Iterator[DeviceRun]:
-    """Yield the hand of a run, and the server at which a device can take hold of it.
+    """Yield the hand of a run, and the process at which a device can take hold of it.
 
     Args:
         prepared: The run.
@@ -77,29 +80,31 @@ def device_run(
     """
     simulation, scene = prepared.simulation, prepared.scene
     watchdog = WATCHDOG if device.watchdog is None else device.watchdog
-    # What waits and what listens is called later, when there is a server.
-    pace = Pace(sleep=lambda seconds: server.serve_for(seconds), shortest_pause=0.0)
+    pace = Pace(shortest_pause=0.0)
     hand = DeviceHand(
         simulation,
         lambda: pace.factor,
-        lambda: server.serve_for(0.0),
         seconds=LONGEST_RUN if scene.seconds is None else scene.seconds,
         watchdog=watchdog,
         ends_with_client=device.client_stops == "end",
     )
     listen = device.listen or f"{DEFAULT_HOST}:{DEFAULT_DEVICE_PORT}"
     host, port = parse_address(listen)
-    server = DeviceServer(
-        hand,
+    end = DeviceEnd(
         DeviceDescription(scene.name, watchdog, MOST_SPEED, MOST_TURN_RATE),
-        host=host,
-        port=port,
-        key=chosen_key(device.listen_key),
+        simulation.arm.limits,
+        hand.blade.half,
     )
-    # A run that stands still serves, too.
-    controls = RunControls(pace, History(simulation), hand, commands, sleep=server.serve_for)
-    with server:
-        yield DeviceRun(hand, server, controls)
+    key = chosen_key(device.listen_key)
+
+    def stand_still(seconds: float) -> None:
+        hand.tell()  # a run that stands still is not silent
+        time.sleep(seconds)
+
+    controls = RunControls(pace, History(simulation), hand, commands, sleep=stand_still)
+    with DeviceProcess(end, hand.report(), host, port, key) as answers:
+        hand.answers = answers
+        yield DeviceRun(hand, answers, controls)
 
 
 def perform_device(
@@ -109,25 +114,38 @@ def perform_device(
 
     Args:
         prepared: The run.
-        led: Its hand and its server.
+        led: Its hand, and what answers the device.
         is_running: Whether what shows it is still there.
 
     Raises:
         Interrupted: the user or the system ended the run.
         RunError: nothing shows it any more before a device came; or the run failed.
     """
-    hand, server, controls = led
-    wait_until(
-        f"waiting for a device at {server.address}",
-        lambda: hand.has_begun,
-        "a device took hold of the blade",
-        lambda: server.serve_for(SECONDS_PER_WAIT),
-        is_running,
+    hand, answers, controls = led
+
+    def look() -> None:
+        hand.listen()
+        time.sleep(SECONDS_PER_WAIT)
+
+    def wait_for_a_device() -> None:
+        wait_until(
+            f"waiting for a device at {answers.address}",
+            lambda: hand.has_begun,
+            "a device took hold of the blade",
+            look,
+            is_running,
+        )
+
+    def tell_and_wait(now: Simulation) -> None:
+        hand.tell()
+        controls.pace.wait(now.dt)
+
+    summary = perform(
+        prepared, every_frame=tell_and_wait, controls=controls, before_frames=wait_for_a_device
     )
-    summary = perform(prepared, controls=controls)
-    counted = server.state()
+    counted = answers.command()
     say(
-        f"periods missed: {counted.n_missed}, frames limited: {counted.n_limited}, "
+        f"periods missed: {counted.n_missed}, frames limited: {hand.n_limited}, "
         f"messages dropped: {counted.n_dropped}"
     )
     return summary

@@ -82,6 +82,7 @@ def perform(
     every_frame: Callable[[Simulation], None] | None = None,
     controls: RunControls | None = None,
     resumption: Resumption | None = None,
+    before_frames: Callable[[], None] | None = None,
 ) -> Summary:
     """Do a run, by its script or by a hand, and write its files.
 
@@ -97,6 +98,8 @@ def perform(
             graspers; what it does is written, as `stroke.csv` and a file for each grasper, and the
             run ends with a rest after the hand has ended.
         resumption: Files of the run, if it continues from there.
+        before_frames: Called once the first files are written: what it waits for finds all ready.
+            If it raises, they are removed.
 
     Raises:
         StateError: a run that continues is made otherwise than it was.
@@ -111,7 +114,6 @@ def perform(
     if hand is not None:
         settings = settings | {"stroke": simulation.stroke.name}
     if controls is not None:
-        controls.pace.go_on()
         every_frame = every_frame or (lambda now: controls.pace.wait(now.dt))
     seconds = _length_of(prepared, hand, resumption)
     simulation.recording.keep_in(prepared.folder)
@@ -138,6 +140,9 @@ def perform(
         with RunCheckpoints(run, plan) as checkpoints:
             if controls is not None:
                 controls.history.begin(checkpoints, outputs, replay)
+            _wait(before_frames, outputs)
+            if controls is not None:
+                controls.pace.go_on()
             calls = [each for each in (advance, every_frame) if each is not None]
             run.failure = _run_frames(run, seconds, calls, controls, stop, checkpoints)
         stopped, stop.is_writing = stop.reason, True
@@ -181,6 +186,18 @@ def _raise_what_ended_it(
         raise RunError(f"{one_line(attempts.errors[0])}; {kept}{further}") from attempts.errors[0]
     if stop.reason is not None:
         raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
+
+
+def _wait(before_frames: Callable[[], None] | None, outputs: Outputs) -> None:
+    """Call what is to be done before the first frame; remove the first files where it fails."""
+    if before_frames is None:
+        return
+    try:
+        before_frames()
+    except BaseException:
+        outputs.free_reserve()
+        outputs.remove_earlier_files()
+        raise
 
 
 def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:

@@ -129,6 +129,7 @@ def live_state(controls: RunControls) -> LiveState:
         controls.has_ended,
         controls.notice,
         controls.results,
+        0.0 if hand is None else hand.stylus_distance,
     )
     return LiveState(run, None if hand is None else _state_of_hand(hand))
 

@@ -123,6 +123,8 @@ class RunState(
     """The message to the person."""
     results: RunResults | None = None
     """What it has given; None: it goes on."""
+    stylus_distance: float = 0.0
+    """How far the stylus of a device is from the blade [m]."""
 
 
 class LiveState(NamedTuple):

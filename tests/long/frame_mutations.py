@@ -292,8 +292,8 @@ def _damaged_request(client: Talker, random: np.random.Generator) -> tuple[int, 
 class CheckedBlade:
     """What a device drives, as `DrivenBlade`: it accepts nothing that a blade could not do."""
 
-    def servo_cp(self, pose: CartesianPose, *, holds: bool) -> None:
-        assert holds in (True, False)
+    def servo_cp(self, pose: CartesianPose, *, holds: bool, period: float) -> None:
+        assert holds in (True, False) and 0.0 < period <= 1.0
         assert (np.abs(pose.position) <= 1000.0).all()
         assert abs(np.linalg.norm(pose.orientation) - 1.0) < 1e-9
 

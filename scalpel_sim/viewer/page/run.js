@@ -3,10 +3,11 @@
 "use strict";
 
 const SLOWER = 0.95; // factor of real time, of what was requested, below which the page says so
+const PARTED = 0.005; // distance of stylus and blade from which the page tells it [m]
 
 const NO_STATE = {
     paused: false, rate: 1, real_time: 1, can_go_back: false, strokes: 0, ended: false, notice: "",
-    results: null,
+    stylus_distance: 0, results: null,
 };
 
 class Run {
@@ -103,8 +104,10 @@ class Run {
     }
 
     showControls() {
-        const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes, ended, notice, results } =
-            this.state || NO_STATE;
+        const {
+            paused, rate, real_time: realTime, can_go_back: canGoBack, strokes, ended, notice, results,
+            stylus_distance: distance,
+        } = this.state || NO_STATE;
         for (const id of ["pause", "step", "rate", "end"]) element(id).disabled = !this.leads || ended;
         element("pause").textContent = paused ? "continue" : "pause";
         element("rate").value = String(rate);
@@ -114,12 +117,17 @@ class Run {
         element("reset").title = ended ? "the same run from its start" : "back to the start";
         element("reset").disabled = !this.leads || (ended ? !mayRepeat : !canGoBack);
         element("take-over").hidden = this.leads || this.socket === null;
-        element("pace").textContent = ended ? "ended" : paused ? "paused" : paceOf(realTime, rate);
+        element("pace").textContent = ended ? "ended" : paused ? "paused" : paceOf(realTime, rate) + aheadOf(distance);
         element("notice").textContent = notice;
         element("notice").hidden = notice === "";
         if (this.next) this.next.showControls();
         this.results.show(results);
     }
+}
+
+// How far the stylus of a device and the blade have parted, where that is more than the blade takes to follow.
+function aheadOf(distance) {
+    return distance < PARTED ? "" : `, stylus ${(1e3 * distance).toFixed(0)} mm from the blade`;
 }
 
 function paceOf(realTime, rate) {

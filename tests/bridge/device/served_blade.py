@@ -28,7 +28,7 @@ class NotedBlade:
     def __init__(self):
         self.asked = []
 
-    def servo_cp(self, pose, *, holds):
+    def servo_cp(self, pose, *, holds, period):
         self.asked.append(("servo_cp", *pose.position.tolist(), holds))
         if pose.position[0] > 1.0:
             raise ValueError("the stylus has jumped")

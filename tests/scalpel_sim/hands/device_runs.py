@@ -45,7 +45,7 @@ class WatchedRun:
     def __init__(self, prepared: PreparedRun, led: DeviceRun) -> None:
         self.simulation, self.led = prepared.simulation, led
         self.frames: list[FrameSeen] = []
-        self.address = led.server.address
+        self.address = led.answers.address
         self.simulation.blade.controller = led.hand
 
     def run(self, seconds: float) -> None:
@@ -55,6 +55,7 @@ class WatchedRun:
 
         def note(now) -> None:
             self.frames.append(FrameSeen(time.monotonic(), hand.is_engaged, hand.tip))
+            hand.tell()
             controls.pace.wait(now.dt)
             while controls.obey():
                 pass

@@ -1,8 +1,10 @@
 """`scalpel-sim run --hand device`, led by a fake device from another process."""
 
 import json
+import os
 import re
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from bridge.tcp.keys import read_key
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.recording import read_forces
-from scalpel_sim.runs.file_names import FORCES, STROKE, SUMMARY
+from scalpel_sim.runs.file_names import FORCES, INITIAL, STROKE, SUMMARY
 from tests.scalpel_sim.hands.device_runs import lead_forwards
 from tests.scalpel_sim.hands.driven_view import DeviceRunProcess, assert_a_run_repeats
 
@@ -91,11 +93,26 @@ def test_the_page_shows_a_run_that_a_device_leads(tmp_path):
     assert json.loads((tmp_path / SUMMARY).read_text())["simulated_seconds"] < 1.0
 
 
-def test_an_interrupted_run_that_waits_for_a_device_ends(tmp_path):
+def test_a_run_that_waits_for_a_device_has_its_first_files_and_leaves_none_where_it_ends(tmp_path):
     with DeviceRunProcess("run", tmp_path) as run:
+        assert (tmp_path / INITIAL).exists()
         run.process.send_signal(signal.SIGINT)
         run.line_with("before a device took hold of the blade")
         assert run.process.wait(30) == 1
+    assert [path.name for path in tmp_path.iterdir() if not path.name.startswith(".")] == []
+
+
+def test_a_run_whose_answers_end_keeps_what_was_done_and_says_so(tmp_path):
+    with DeviceRunProcess("run", tmp_path) as run:
+        with DeviceClient(run.address) as client:
+            lead_forwards(client, 1e-3)
+            children = Path(f"/proc/{run.process.pid}/task/{run.process.pid}/children")
+            for pid in children.read_text().split():
+                if b"answer_a_device" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    os.kill(int(pid), signal.SIGKILL)
+        run.line_with("the process that answers the device has ended")
+        assert run.process.wait(60) == 1
+    assert json.loads((tmp_path / SUMMARY).read_text())["status"].startswith("failed")
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ def test_reports_of_a_spacemouse_lead_the_blade_let_go_and_end(tmp_path):
         with beside(act) as mouse_thread:
             while mouse_thread.is_alive() and run.led.hand.ended_at is None:
                 run.run(0.05)
-            run.led.server.serve_for(0.2)
+            run.led.hand.tell()
     tips = np.array([frame.tip for frame in run.frames])
     engaged = np.array([frame.is_engaged for frame in run.frames])
     assert tips[-1] - tips[0] == pytest.approx([0.0, pushed_away(), 0.0], abs=2e-4)
