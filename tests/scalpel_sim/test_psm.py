@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bridge import FixtureBox
 from scalpel_sim import prepare
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
@@ -90,6 +91,30 @@ def test_the_trocar_of_the_scene_is_where_the_shaft_passes():
     simulation = prepare(scene)
     there = simulation.frame.points_to_world(np.array(scene.arm.trocar))
     assert ShaftWatch(simulation).trocar == pytest.approx(there, abs=1e-12)
+
+
+def hole_in_a_wall(trocar, half_width):
+    """Four plates around a square hole in a body wall, level, at a trocar."""
+    plates, width, thickness = [], 0.02, 2e-4
+    for k, (axis, side) in enumerate([(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)]):
+        centre, size = np.array(trocar), np.array([width, width, thickness])
+        centre[axis] += side * (half_width + 0.5 * width)
+        size[1 - axis] = 2.0 * (half_width + width)
+        plates.append(FixtureBox(f"wall{k}", size, centre))
+    return plates
+
+
+def test_the_cannula_swings_in_a_hole_a_quarter_of_a_millimetre_wider_and_touches_a_tighter_one():
+    """By the collisions of its geoms: of 6 mm radius, it leans by up to 19.2 degrees."""
+    trocar, leaning = (0.02, 0.02, 0.17), 6e-3 / np.cos(np.radians(19.2))
+    scene = scene_with("grid2", 'arm.preset="psm"', f"arm.trocar={list(trocar)}")
+    touched = []
+    for half_width in (leaning + 0.5 * HELD, 6e-3 - HELD):
+        simulation = prepare(scene, fixtures=hole_in_a_wall(trocar, half_width))
+        simulation.run(simulation.duration)
+        assert simulation.recording.column("cut_area_m2")[-1] > 1.5e-3
+        touched.append(set(simulation.touching.frames))
+    assert touched == [set(), {f"cannula, wall{k}" for k in range(4)}]
 
 
 @pytest.mark.parametrize(
