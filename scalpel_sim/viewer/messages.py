@@ -9,6 +9,7 @@ import msgspec
 from bridge import TissueFrame
 from scalpel_sim.hands.commands import Command
 from scalpel_sim.scene.schema import ViewTable
+from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity
@@ -54,6 +55,8 @@ class PageControls(NamedTuple):
     """Whether it leads the blade."""
     choices: Choices | None = None
     """Choices for the next run; None: there is none."""
+    look: Look = ORGAN_LOOK
+    """Look of the body's material."""
 
 
 class ViewerSettings(NamedTuple):
@@ -77,6 +80,8 @@ class ViewerSettings(NamedTuple):
     """Whether it leads the blade, too."""
     choices: Choices | None = None
     """Choices for the next run; None: there is none."""
+    look: Look = ORGAN_LOOK
+    """Look of the body's material."""
 
 
 class SceneState(NamedTuple):

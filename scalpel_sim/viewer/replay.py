@@ -13,6 +13,7 @@ from scalpel_sim.errors import RunError
 from scalpel_sim.recording.growing_file import FileSum
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
+from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.page import replay_page
@@ -56,6 +57,7 @@ class ReplayWriter:
         wireframe: bool = False,
         views: Sequence[ViewTable] = (),
         log: FrameLog | None = None,
+        look: Look = ORGAN_LOOK,
     ) -> None:
         """Prepare a replay.
 
@@ -66,12 +68,14 @@ class ReplayWriter:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
             log: Holds its frames, and those of the run so far; None: a temporary file does.
+            look: Look of the body's material.
         """
         self._model = model
         self._title = title
         self._tissue_frame = frame
         self._wireframe = wireframe
         self._views = tuple(views)
+        self._look = look
         self._log = FrameLog() if log is None else log
         self._last: tuple[float, SceneState] | None = None
         self._frames: list[LoggedFrame] = []
@@ -161,7 +165,11 @@ class ReplayWriter:
         # The shapes are made here and not at the start, which loading trimesh would delay by 0.3 s.
         shapes = shapes_of(self._model)
         packets = ScenePackets(
-            shapes, self._tissue_frame, wireframe=self._wireframe, views=self._views
+            shapes,
+            self._tissue_frame,
+            wireframe=self._wireframe,
+            views=self._views,
+            look=self._look,
         )
         for i, (time, state) in enumerate(self._all()):
             if i == 0:

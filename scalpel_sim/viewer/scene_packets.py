@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from bridge import TissueFrame
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.primitives import TriangleMesh
@@ -62,11 +63,9 @@ _WET = {
     "shininess": 55,
     "reflectivity": 0.06,
     "combine": ADD,
+    "finish": "wet",
 }
 """Properties of the material of wet tissue."""
-
-LIGHT_IN_A_CUT = 0x5A1216
-"""Light scattered between the faces of a cut, 0xRRGGBB. Without it a narrow cut looks black."""
 
 _STEEL = {
     "color": 0x98A1A8,
@@ -74,6 +73,7 @@ _STEEL = {
     "shininess": 120,
     "reflectivity": 0.7,
     "combine": MIX,
+    "finish": "steel",
 }
 """Properties of the material of the blade."""
 
@@ -101,6 +101,7 @@ class ScenePackets:
         *,
         wireframe: bool = False,
         views: Sequence[ViewTable] = (),
+        look: Look = ORGAN_LOOK,
     ) -> None:
         """Prepare the packets of one run.
 
@@ -109,11 +110,13 @@ class ScenePackets:
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             views: Cameras that the page offers besides its own; it begins with the first.
+            look: Look of the body's material.
         """
         self._shapes = list(shapes)
         self._frame = frame or TissueFrame()
         self._wireframe = wireframe
         self._views = tuple(views)
+        self._look = look
         self._bodies = sorted({shape.body for shape in self._shapes})
         self._diagonal = 1.0
 
@@ -128,7 +131,7 @@ class ScenePackets:
         centre = self._frame.points_to_world((lowest + highest) / 2.0)
         self._diagonal = float(np.linalg.norm(highest - lowest))
         scene = Scene3D()
-        _set_tissue_appearances(scene, self._diagonal)
+        _set_tissue_appearances(scene, self._diagonal, self._look)
         for shape in self._shapes:
             self._set_shape(scene, shape, centre, body_poses[shape.body])
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
@@ -144,7 +147,7 @@ class ScenePackets:
         """Return the packet that shows one instant."""
         scene = Scene3D()
         levels, tops = levels_of(state.values)
-        textured = map_texture(state.surface, self._diagonal / TILES_PER_BODY, levels)
+        textured = map_texture(state.surface, self._diagonal / TILES_PER_BODY, levels, self._look)
         scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
         scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
         scene.set_scales(tops)
@@ -200,12 +203,12 @@ class ScenePackets:
         return centre + CAMERA_DISTANCE * self._diagonal * direction
 
 
-def _set_tissue_appearances(scene: Scene3D, diagonal: float) -> None:
+def _set_tissue_appearances(scene: Scene3D, diagonal: float, look: Look) -> None:
     """Define the appearances of skin and cut faces, with relief [m] in proportion to the body."""
     relief = {"bumpScale": 0.0025 * diagonal}
     for name, picture, glow in (
-        ("skin", textures.skin(), 0x000000),
-        ("cut", textures.cut_face(), LIGHT_IN_A_CUT),
+        ("skin", textures.skin(look), 0x000000),
+        ("cut", textures.cut_face(look), look.glow),
     ):
         properties = {**_WET, **relief, "emissive": glow}
         maps = {"map": picture, "bumpMap": picture}

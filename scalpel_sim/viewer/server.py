@@ -296,7 +296,11 @@ async def serve(newest: NewestState) -> None:
 def _packets_of(settings: ViewerSettings) -> ScenePackets:
     """Return what makes the packets of a run."""
     return ScenePackets(
-        settings.shapes, settings.frame, wireframe=settings.wireframe, views=settings.views
+        settings.shapes,
+        settings.frame,
+        wireframe=settings.wireframe,
+        views=settings.views,
+        look=settings.look,
     )
 
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
+from scalpel_sim.viewer.looks import ORGAN_LOOK, Look, Ramp
 from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import BoolArray, FloatArray, IntArray, Surface
 
@@ -26,13 +27,6 @@ TEXTURE_PIXELS = 512
 
 N_COLOURS = 64
 """Number of colours of a ramp. More cannot be seen, and cost bytes in every replay."""
-
-SKIN_RAMP = ((0.0, "4d1613"), (0.3, "7d2a22"), (0.55, "9c3f32"), (0.8, "b3574a"), (1.0, "cc7d6c"))
-"""Colours of skin from deep vessels, dark red-brown, to the thin capsule, pink: position along the
-ramp and sRGB colour."""
-
-CUT_RAMP = ((0.0, "7a0f14"), (0.35, "b01f22"), (0.65, "d4423c"), (0.9, "ea7a6a"), (1.0, "f6b3a0"))
-"""Colours of cut faces from the blood between fibres, red, to bare fibres, pale pink."""
 
 CREASE_COSINE = 0.87
 """Cosine of 30 degrees. Where the normal of a chart differs by more from the normal of all
@@ -62,8 +56,8 @@ NO_LEVELS: Mapping[str, IntArray] = {}
 
 
 @functools.cache
-def skin() -> bytes:
-    """Return the texture of an organ's skin as a PNG: mottled, with fine branching vessels."""
+def skin(look: Look = ORGAN_LOOK) -> bytes:
+    """Return the texture of a skin as a PNG: mottled, with fine branching vessels."""
     mottling = _standardized(_noise(seed=1, wavelength=90.0, spread=0.9))
     grain = _standardized(_noise(seed=2, wavelength=9.0, spread=0.5))
     vessels = np.maximum(
@@ -71,19 +65,20 @@ def skin() -> bytes:
         0.7 * _ridges(seed=4, wavelength=70.0, width=0.06),
     )
     fading = np.clip(0.55 + 0.5 * _standardized(_noise(seed=5, wavelength=200.0, spread=0.5)), 0, 1)
-    height = 0.54 + 0.11 * mottling + 0.05 * grain - 0.42 * vessels * fading
-    return _png(height, SKIN_RAMP)
+    patches = look.variation * (0.11 * mottling + 0.05 * grain)
+    height = 0.54 + patches - 0.42 * look.vessels * vessels * fading
+    return _png(height, look.skin)
 
 
 @functools.cache
-def cut_face() -> bytes:
+def cut_face(look: Look = ORGAN_LOOK) -> bytes:
     """Return the texture of cut faces as a PNG: striated along u, brighter and redder than skin."""
     fibres = _standardized(_noise(seed=11, wavelength=11.0, spread=0.7, stretch=6.0))
     bundles = _standardized(_noise(seed=12, wavelength=70.0, spread=0.6, stretch=3.5))
     grain = _standardized(_noise(seed=13, wavelength=5.0, spread=0.4))
     lobules = _ridges(seed=14, wavelength=110.0, width=0.05)
-    height = 0.50 + 0.09 * fibres + 0.06 * bundles + 0.03 * grain - 0.12 * lobules
-    return _png(height, CUT_RAMP)
+    striation = look.fibres * (0.09 * fibres + 0.06 * bundles - 0.12 * lobules)
+    return _png(0.50 + striation + 0.03 * look.variation * grain, look.inside)
 
 
 @functools.cache
@@ -129,7 +124,7 @@ def _ridges(seed: int, wavelength: float, width: float) -> FloatArray:
     return np.exp(-((field / width) ** 2))
 
 
-def _png(height: FloatArray, ramp: tuple[tuple[float, str], ...]) -> bytes:
+def _png(height: FloatArray, ramp: Ramp) -> bytes:
     """Return heights between 0 and 1 as a PNG with a palette, coloured by a ramp."""
     knots = [position for position, _ in ramp]
     colours = np.array([list(bytes.fromhex(colour)) for _, colour in ramp], dtype=float)
@@ -153,7 +148,10 @@ class TexturedSurface(NamedTuple):
 
 
 def map_texture(
-    surface: Surface, tile: float, levels: Mapping[str, IntArray] = NO_LEVELS
+    surface: Surface,
+    tile: float,
+    levels: Mapping[str, IntArray] = NO_LEVELS,
+    look: Look = ORGAN_LOOK,
 ) -> TexturedSurface:
     """Return the skin and the cut faces of a body with texture coordinates, normals and tints.
 
@@ -161,16 +159,35 @@ def map_texture(
         surface: Boundary triangles of the body.
         tile: Length of the material that one repeat of the texture covers [m].
         levels: Quantities at the vertices of the surface, see `TriangleMesh.levels`.
+        look: Look of its material.
     """
     skin, cut = (
-        _textured_triangles(surface, surface.triangles[chosen], tile, levels)
+        _textured_triangles(surface, surface.triangles[chosen], tile, levels, look.variation)
         for chosen in (~surface.is_cut, surface.is_cut)
     )
+    if cut.tints is not None:
+        of_skin = np.zeros(len(surface.positions), dtype=bool)
+        of_skin[surface.triangles[~surface.is_cut]] = True
+        is_at_rim = of_skin[_nodes_of(surface.triangles[surface.is_cut], cut.triangles)]
+        is_dark = is_at_rim if look.rim < 0.0 else ~is_at_rim
+        shades = np.where(is_dark, 1.0 - abs(look.rim), 1.0)
+        cut = cut._replace(tints=cut.tints * shades[:, None])
     return TexturedSurface(skin, cut)
 
 
+def _nodes_of(triangles: IntArray, corners: IntArray) -> IntArray:
+    """Return the node of each vertex, from triangles between nodes and between vertices."""
+    nodes = np.zeros(corners.max(initial=-1) + 1, dtype=np.int64)
+    nodes[corners] = triangles
+    return nodes
+
+
 def _textured_triangles(
-    surface: Surface, triangles: IntArray, tile: float, levels: Mapping[str, IntArray]
+    surface: Surface,
+    triangles: IntArray,
+    tile: float,
+    levels: Mapping[str, IntArray],
+    variation: float,
 ) -> TriangleMesh:
     """Return some triangles of the surface as a mesh of its own."""
     rest_faces = _area_normals(surface.rest_positions, triangles)
@@ -191,7 +208,7 @@ def _textured_triangles(
         triangles=corners,
         normals=_unit(np.where(is_on_crease[:, None], of_chart, of_node)),
         uv=np.take_along_axis(rest, CHART_AXES[chart], axis=1) / tile + CHART_SHIFT[chart],
-        tints=_tints(rest / tile),
+        tints=_tints(rest / tile, variation),
         levels={name: values[node] for name, values in levels.items()},
     )
 
@@ -236,7 +253,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
 
 
-def _tints(points: FloatArray) -> FloatArray:
+def _tints(points: FloatArray, variation: float) -> FloatArray:
     """Return a slowly varying tint at points given in tiles, shape (n, 3), between 0 and 1.
 
     The tint is a sum of plane waves in random directions, so that it has no charts and no seams.
@@ -245,6 +262,6 @@ def _tints(points: FloatArray) -> FloatArray:
     waves = random.standard_normal((3, N_WAVES)) * 4.0
     phases = random.uniform(0.0, 2.0 * np.pi, N_WAVES)
     height = np.sin(points @ waves + phases).sum(axis=1) / np.sqrt(N_WAVES / 2.0)
-    tint = 0.80 + TINT_DEPTH * height[:, None] * np.array([0.55, 0.9, 1.0])
+    tint = 0.80 + variation * TINT_DEPTH * height[:, None] * np.array([0.55, 0.9, 1.0])
     clipped: FloatArray = np.clip(tint, 0.0, 1.0)
     return clipped

@@ -21,6 +21,7 @@ from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Release, command_of
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.colouring import wanted_of
+from scalpel_sim.viewer.looks import ORGAN_LOOK
 from scalpel_sim.viewer.messages import (
     MOST_ROWS_OF_FORCES,
     NO_VALUES,
@@ -299,6 +300,7 @@ def _settings_of(
         has_controls=controls is not None,
         is_led=controls is not None and controls.is_led,
         choices=None if controls is None else controls.choices,
+        look=ORGAN_LOOK if controls is None else controls.look,
     )
 
 

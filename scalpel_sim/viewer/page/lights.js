@@ -43,7 +43,7 @@ class Lights {
 }
 
 // The surroundings that steel and wet tissue reflect: a grey room with lamps under its ceiling. It is
-// drawn on six canvases, because filtering a rendered room takes seconds without a graphics card.
+// drawn on six canvases.
 function room() {
     const size = 64;
     const paint = (draw) => {
@@ -75,5 +75,13 @@ function room() {
     const texture = new THREE.CubeTexture([wall, wall, ceiling, floor, wall, wall]);
     texture.encoding = THREE.sRGBEncoding;
     texture.needsUpdate = true;
+    return texture;
+}
+
+// The same for each roughness, as physically based materials need it: for a card the work of a moment.
+function filtered(room, renderer) {
+    const generator = new THREE.PMREMGenerator(renderer);
+    const { texture } = generator.fromCubemap(room);
+    generator.dispose();
     return texture;
 }

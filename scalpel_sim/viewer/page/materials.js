@@ -1,9 +1,18 @@
-// Materials by their descriptions: each has a plain twin, which coarse pictures are drawn with.
+// Materials by their descriptions: each has a plain twin, which coarse pictures are drawn with, and a rich
+// one for a graphics card.
 "use strict";
 
+// What wet tissue and polished steel are to light. A rough body below a smooth, clear film of moisture.
+const WET = {
+    roughness: 0.55, metalness: 0, clearcoat: 0.5, clearcoatRoughness: 0.22, envMapIntensity: 0.55,
+};
+const STEEL = { roughness: 0.3, metalness: 0.8, envMapIntensity: 2.2 };
+const STEEL_COLOUR = 0xdfe4e8;
+
 // `redraw` is called when a texture has been read.
-function materialOf(kind, properties, maps, room, redraw) {
+function materialOf(kind, { finish, ...properties }, maps, room, redraw) {
     const material = new THREE[kind]({ ...properties, side: THREE.DoubleSide });
+    material.userData.finish = finish;
     for (const colour of [material.color, material.specular, material.emissive]) {
         if (colour) colour.convertSRGBToLinear();
     }
@@ -16,6 +25,18 @@ function materialOf(kind, properties, maps, room, redraw) {
         material[property] = texture;
     }
     return material;
+}
+
+// The same of physically based materials, as a card draws them at little cost; `room` is what they reflect,
+// filtered by roughness. Paint stays as it is.
+function richOf(material, room) {
+    if (material.userData.finish === undefined) return material;
+    const isSteel = material.userData.finish === "steel";
+    const rich = new THREE.MeshPhysicalMaterial({ ...(isSteel ? STEEL : WET), envMap: room, side: THREE.DoubleSide });
+    for (const property of ["vertexColors", "map", "bumpMap", "bumpScale"]) rich[property] = material[property];
+    rich.color.copy(isSteel ? new THREE.Color(STEEL_COLOUR).convertSRGBToLinear() : material.color);
+    rich.emissive.copy(material.emissive);
+    return rich;
 }
 
 // The same without relief, reflection and gloss, lit at the vertices: a picture by software takes a

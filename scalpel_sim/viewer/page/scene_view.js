@@ -20,6 +20,7 @@ class SceneView {
         this.cameras = [];
         this.chosen = 0;
         this.room = room();
+        this.filteredRoom = this.isSoftware ? null : filtered(this.room, this.viewer.renderer);
         this.appearances = new Map();
         this.plain = new Map(); // the same for coarse pictures
         this.isPlain = false;
@@ -66,8 +67,9 @@ class SceneView {
 
     setAppearance({ name, kind, properties, maps }) {
         const redraw = () => this.viewer.set_dirty();
-        this.appearances.set(name, materialOf(kind, properties, maps, this.room, redraw));
-        this.plain.set(name, plainOf(this.appearances.get(name)));
+        const material = materialOf(kind, properties, maps, this.room, redraw);
+        this.appearances.set(name, this.filteredRoom ? richOf(material, this.filteredRoom) : material);
+        this.plain.set(name, plainOf(material));
     }
 
     // Returns whether the object is a mesh with a shared appearance. meshcat handles all others.
@@ -86,7 +88,8 @@ class SceneView {
         } else {
             const mesh = new THREE.Mesh(command.geometry, material);
             mesh.castShadow = !material.transparent;
-            mesh.receiveShadow = true;
+            // On thin parts that move a shadow would be stripes: their own.
+            mesh.receiveShadow = path[0] === "tissue" || path[1] === "0";
             mesh.name = "<object>";
             node.set_object(mesh);
         }

@@ -5,9 +5,11 @@ import pytest
 from PIL import Image
 
 from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.looks import LOOKS, ORGAN_LOOK, look_of
 from scalpel_sim.viewer.textures import map_texture
 from tests.scalpel_sim.cut_block import cut_block
-from tissue import Surface, liver_lobe
+from tests.scalpel_sim.real_cut import cut_tissue
+from tissue import MATERIALS, Material, Surface, liver_lobe
 from tissue.mesh.faces import boundary_faces
 
 TILE = 0.02
@@ -41,6 +43,34 @@ def test_cut_faces_are_striated_and_skin_is_not():
 
     assert anisotropy(decoded(textures.cut_face())) > 1.5
     assert 0.8 < anisotropy(decoded(textures.skin())) < 1.25
+
+
+def test_each_tissue_by_name_has_a_look_of_its_own_however_tough_it_is():
+    for name, look in LOOKS.items():
+        tissue = MATERIALS[name].material
+        assert look_of(tissue) is look_of(tissue.changed(toughness=7.0)) is look
+    assert look_of(Material()) is ORGAN_LOOK
+
+
+def test_gelatin_is_even_and_has_no_vessels():
+    spread = [
+        decoded(textures.skin(look)).std(axis=(0, 1)).max()
+        for look in (LOOKS["gelatin"], ORGAN_LOOK)
+    ]
+    assert spread[0] < 0.3 * spread[1]
+
+
+@pytest.mark.parametrize("name", ["liver", "skin"])
+def test_the_faces_of_a_cut_have_a_rim_of_another_shade_at_the_skin(name):
+    surface, look = cut_tissue()[2], LOOKS[name]
+    cut = map_texture(surface, 0.02, look=look).cut
+    plain = map_texture(surface, 0.02, look=look._replace(rim=0.0)).cut
+    shades = (cut.tints / plain.tints).mean(axis=1)
+    of_skin = surface.positions[np.unique(surface.triangles[~surface.is_cut])]
+    at_rim = (cut.positions[:, None] == of_skin).all(axis=2).any(axis=1)
+    assert at_rim.any() and not at_rim.all()
+    dark, pale = (at_rim, ~at_rim) if look.rim < 0 else (~at_rim, at_rim)
+    assert shades[dark] == pytest.approx(1.0 - abs(look.rim)) and shades[pale] == pytest.approx(1.0)
 
 
 def test_the_table_fades_to_nothing_at_its_rim():
