@@ -45,6 +45,7 @@ from .loads.attachment import FramePath as FramePath
 from .loads.attachment import Ligament as Ligament
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
+from .loads.support_path import SupportPath as SupportPath
 from .material import Material as Material
 from .material_presets import DAMPING_BAND as DAMPING_BAND
 from .material_presets import MATERIALS as MATERIALS
@@ -122,6 +123,7 @@ __all__ = [
     "MOST_SUBSTEPS",
     "Material",
     "MaterialPoints",
+    "SupportPath",
     "MeshError",
     "MeshMeasures",
     "Piece",

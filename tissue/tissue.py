@@ -17,6 +17,7 @@ from tissue.cut_settings import CutReport
 from tissue.loads.attachment import Attachment, Ligament, ends_of_fibres
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints, points_of
+from tissue.loads.support_path import SupportPath
 from tissue.material import Material
 from tissue.solver_settings import SolverSettings
 from tissue.state.identity import Identity
@@ -275,6 +276,24 @@ class Tissue(BodyView):
         self._stages.handles.expect_all_nodes_move("supports do not move")
         self._steps.expect_moving()
         self._stages.handles.move_supports(where, velocity)
+
+    def lead_supports(self, where: str | npt.ArrayLike, path: SupportPath) -> None:
+        """Move, turn and stretch fixed nodes along a path, from the next step on.
+
+        At the end of each step they are where the path has them, and in between on a straight line.
+        `move_supports` ends it. Nodes that a cut puts between them are led with them; `settle`
+        stops them until the next step. Their work is in the account of energy.
+
+        Args:
+            where: As `move_supports` takes it.
+            path: Where they go, and when.
+
+        Raises:
+            ValueError: no node there is fixed, one of a list is not, or the relaxation is
+                `hierarchical`, which moves no support.
+        """
+        self._stages.handles.expect_all_nodes_move("supports do not move")
+        self._steps.begin_change().handles.lead_supports(where, path)
 
     def support_forces(self) -> FloatArray:
         """Return the force of the supports on each fixed node now [N], shape (n_nodes, 3).

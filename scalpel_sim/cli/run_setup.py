@@ -57,6 +57,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "blade",
         "audit",
         "attachments",
+        "supports",
     }
 )
 """Settings of a scene that a server knows and does not send."""

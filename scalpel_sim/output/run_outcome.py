@@ -117,6 +117,8 @@ class RunOutcome:
         """Whether the scene moves the body: then it is elsewhere when the blade comes."""
         if self.recording.hands:
             return True
+        if self.settings.get("supports"):
+            return True
         if "attachments" not in self.settings:  # the tissue is elsewhere, and they may move it
             return self.recording.n_held > 0
         moves = {"displacements", "release_at", "breaks_at"}

@@ -11,7 +11,7 @@ import numpy as np
 from scalpel_sim.arm.standing import Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.scene import Scene, naming_table
-from scalpel_sim.scene.schema import AttachmentTable
+from scalpel_sim.scene.schema import AttachmentTable, LedSupportTable
 from scalpel_sim.strokes.stroke import from_csv
 from tissue import (
     Attachment,
@@ -19,6 +19,8 @@ from tissue import (
     FramePath,
     Geom,
     SolverSettings,
+    SupportPath,
+    TetrahedralMesh,
     Tissue,
     expect_toughness_in_range,
     fixed_nodes,
@@ -91,6 +93,8 @@ def make_tissue(scene: Scene) -> Tissue:
     for attachment, row in zip(attachments, scene.attachments, strict=True):
         ends = math.inf if row.release_at is None else row.release_at
         attachment.follow(FramePath(times_of(row), row.displacements or (), release_at=ends))
+    for i, support in enumerate(scene.supports):
+        naming_table(f"[[support]] number {i + 1}", partial(_lead, tissue, mesh, support))
     return tissue
 
 
@@ -161,6 +165,18 @@ def _attach(tissue: Tissue, table: AttachmentTable) -> Attachment:
         area=table.area,
         toughness=table.toughness,
     )
+
+
+def _lead(tissue: Tissue, mesh: TetrahedralMesh, table: LedSupportTable) -> None:
+    """Lead held nodes along their path, from the first frame on."""
+    about = table.about
+    if about is None:
+        nodes = fixed_nodes(mesh, table.where)
+        places = tissue.snapshot().positions[nodes]
+        about = tuple((0.5 * (places.min(axis=0) + places.max(axis=0))).tolist())
+    turns = None if table.rotations_degrees is None else np.radians(table.rotations_degrees)
+    path = SupportPath(table.times, table.displacements, turns, table.stretches, about=about)
+    tissue.lead_supports(table.where, path)
 
 
 def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:

@@ -16,6 +16,7 @@ from scalpel_sim.scene.schema import (
     ArmTable,
     AttachmentTable,
     GrasperTable,
+    LedSupportTable,
     SolverTable,
     ViewTable,
     WaypointTable,
@@ -164,6 +165,18 @@ def check_range(stretch: float, gravity: Sequence[float], seconds: float | None)
         raise UsageError(f"gravity is {math.hypot(*gravity):g} m/s2; it must be at most 100")
     if seconds is not None and not 0.0 < seconds <= LONGEST_RUN:
         raise UsageError(f"seconds is {seconds}; it must be above 0 and at most {LONGEST_RUN:g}")
+
+
+def check_support(table: LedSupportTable, where: str) -> None:
+    """Check that the rows of a support make sense together: see `check_rows`."""
+    fields = (table.displacements, table.rotations_degrees, table.stretches)
+    if all(rows is None for rows in fields):
+        raise UsageError(f"{where} has no displacements, rotations_degrees or stretches")
+    for rows in fields:
+        if rows is not None and len(rows) != len(table.times):
+            raise UsageError(f"{where} has {len(table.times)} times and {len(rows)} rows of a key")
+    if table.times[0] <= 0.0 or any(b <= a for a, b in pairwise(table.times)):
+        raise UsageError(f"{where} has the times {table.times}; they begin above 0 and increase")
 
 
 def check_attachment(table: AttachmentTable, where: str) -> None:

@@ -47,6 +47,7 @@ def _keys(name: str) -> str:
             key: table_of(kind) or row_table_of(kind) for key, kind in kinds_of(root).items()
         }
     tables["case_blade"] = table_of(kinds_of(CaseContent)["blade"])
+    tables["case_support"] = row_table_of(kinds_of(CaseContent)["support"])
     table = tables[name]
     assert table is not None, name
     return _rows(table)

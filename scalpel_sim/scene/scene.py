@@ -20,6 +20,7 @@ from scalpel_sim.scene.checks import (
     check_range,
     check_rows,
     check_solver,
+    check_support,
     check_view,
     virtual_coupling,
 )
@@ -28,6 +29,7 @@ from scalpel_sim.scene.schema import (
     AttachmentTable,
     BladeTable,
     GrasperTable,
+    LedSupportTable,
     PresetMaterialTable,
     SolverTable,
     ViewTable,
@@ -78,6 +80,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """The arm, and how it is coupled to the tissue."""
     attachments: tuple[AttachmentTable, ...] = field(default=(), name="attachment")
     """What holds the tissue besides the fixed nodes."""
+    supports: tuple[LedSupportTable, ...] = field(default=(), name="support")
+    """Held sides that move."""
     graspers: tuple[GrasperTable, ...] = field(default=(), name="grasper")
     """Other arms, each with a grasper, and what they do."""
     strokes: tuple[StrokeTable, ...] = field(default=(StrokeTable(),), name="stroke")
@@ -95,6 +99,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_range(self.body.stretched_by, self.world.free_fall, self.seconds)
         check_arm(self.arm, self.world)
         check_rows("attachment", self.attachments, check_attachment)
+        check_rows("support", self.supports, check_support)
         check_rows("grasper", self.graspers, check_grasper)
         check_rows("view", self.views, check_view)
 
@@ -166,6 +171,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "blade": None if self.blade is None else asdict(self.blade),
             "audit": solver.audit,
             "attachments": [given_in(attachment) for attachment in self.attachments],
+            "supports": [given_in(support) for support in self.supports],
             "strokes": [given_in(stroke) for stroke in self.strokes],
             "arm": arm.preset,
             "own_arm": None if arm.model is None else own | _values(world, "pos", "quat"),

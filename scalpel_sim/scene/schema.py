@@ -267,6 +267,25 @@ class AttachmentTable(TomlTable, kw_only=True, frozen=True):
     """When it releases the tissue [s]."""
 
 
+class LedSupportTable(TomlTable, kw_only=True, frozen=True):
+    """`[[support]]`: held nodes that are led: moved, turned and stretched over time."""
+
+    where: Region
+    """Region whose held nodes it leads, as for `fixed`."""
+    times: Times
+    """When they are at each row, after the start, above 0 [s]. From row to row all changes evenly;
+    after the last they stay."""
+    displacements: RowsOfThree | None = None
+    """How far they are moved from where they are at first, row by row [m]."""
+    rotations_degrees: RowsOfThree | None = None
+    """By how much they are turned, row by row: vectors along the axis and as long as the angle
+    [degree]."""
+    stretches: RowsOfThree | None = None
+    """How many times as long they are along x, y and z, before they are turned, row by row."""
+    about: ThreeNumbers | None = None
+    """Point about which they are turned and stretched [m]; the middle of the region without."""
+
+
 class WaypointTable(TomlTable, kw_only=True, frozen=True):
     """A row of `motion`: where a grasper rests at an instant; what is left out is as before."""
 

@@ -16,6 +16,7 @@ from tissue.loads.attachment import Attachment
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.load import Load, Loads
 from tissue.loads.material_points import MaterialPoints, points_to_hold, region_mask
+from tissue.loads.support_path import LedSupports, SupportPath
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
 
@@ -51,6 +52,8 @@ class Handles:
         self._model = model
         self.loads = Loads()
         """All loads."""
+        self.led_supports = LedSupports()
+        """Supports that follow a path."""
         self.attachments = AttachmentList()
         """All attachments and ligaments."""
         self.act = False
@@ -103,7 +106,19 @@ class Handles:
                 f"velocity is {velocity!r}; it is three finite numbers in m/s, or three for each "
                 f"of the {len(nodes)} nodes"
             )
+        if self.led_supports.act:
+            self.led_supports.forget(body, nodes)
         body.velocities[nodes] = array
+        self._note_moving()
+
+    def lead_supports(self, where: str | npt.ArrayLike, path: SupportPath) -> None:
+        """Lead fixed nodes along a path; see `tissue.Tissue.lead_supports`."""
+        body = self._model.body
+        self.led_supports.lead(body, _supports_at(body, where), path)
+
+    def _note_moving(self) -> None:
+        """Note whether a support moves."""
+        body = self._model.body
         n = body.n_nodes
         self._model.supports.is_moving = int(body.velocities[:n][body.fixed[:n]].any())
 
@@ -174,6 +189,12 @@ class Handles:
             self.attachments.end_step(self._model.body, dt)
             self._hand_over()
 
+    def end_support_step(self, dt: float) -> None:
+        """Note that supports were led for a step of that length [s]."""
+        if self.led_supports.act:
+            self.led_supports.end_step(self._model.body, dt)
+            self._note_moving()
+
     def inputs(self, sweep: BladeSweep | None, dt: float) -> StepInputs:
         """Return what acts on the body in the next step, so that the step can be repeated.
 
@@ -182,6 +203,9 @@ class Handles:
             dt: Length of the step [s].
         """
         loads, attachments, model = self.loads, self.attachments, self._model
+        if self.led_supports.act and dt > 0.0:
+            self.led_supports.write_velocities(model.body, dt)
+            self._note_moving()
         geoms, supports, body = model.geoms, model.supports, model.body
         if not (self.act or geoms.geoms or supports.is_moving):
             return StepInputs(sweep, dt)

@@ -15,6 +15,7 @@ from tissue.core.memento_reading import StateError, put_to, written
 from tissue.loads.attachment import Attachment, FramePath, Ligament
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints
+from tissue.loads.support_path import SupportPath
 from tissue.state.identity import Identity
 from tissue.state.memory_in_use import STRUCTS
 
@@ -55,7 +56,7 @@ RULES = StateRules(
     structs=STRUCTS,
     made={
         kind.__name__: kind
-        for kind in (Attachment, FramePath, Geom, Ligament, Load, MaterialPoints)
+        for kind in (Attachment, FramePath, Geom, Ligament, Load, MaterialPoints, SupportPath)
     },
 )
 """What of a tissue is its state."""

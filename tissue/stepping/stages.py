@@ -154,6 +154,7 @@ class StepStages:
             model.geoms.stop()
         if handles.act:
             handles.end_step(dt)
+        handles.end_support_step(dt)
         stage_times = StageTimes(collision, topology, relaxation)
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
