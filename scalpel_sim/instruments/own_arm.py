@@ -6,7 +6,6 @@ would hold the joints where they are.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -16,7 +15,7 @@ import numpy as np
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.arm import DrivenArm
 from scalpel_sim.arm.chain_kinematics import ChainKinematics
-from scalpel_sim.arm.firm_hand import firm_impedance
+from scalpel_sim.arm.grasper import FORWARD
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.model_file import spec_of_file
 from scalpel_sim.arm.placement import PlacementError
@@ -49,6 +48,7 @@ def own_arm(
     path: Path,
     limits: DeviceLimits,
     *,
+    impedance: Impedance = Impedance(),
     mount: Mount | None = None,
     heel: str = "heel",
     tip: str = "tip",
@@ -60,6 +60,7 @@ def own_arm(
     Args:
         path: The file. Without a mount it needs two sites at the ends of the edge, on one body.
         limits: Largest force and torque that the arm can render.
+        impedance: How firmly its hand holds the blade.
         mount: Scalpel that it holds; its edge then is that of the arm. None: it has a blade.
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
@@ -69,25 +70,27 @@ def own_arm(
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.
     """
-    edge = partial(DrivenArm, heel=heel, tip=tip, forward=forward)
-
-    def led(*settings: Impedance, others: Sequence[Standing] = ()) -> DrivenArm:
-        spec, arm = own_spec(path), edge
+    try:
+        spec = own_spec(path)
         if mount is not None:
             prefix = add_scalpel(
                 spec, mount.at, mount.blade, length=mount.length, forward=mount.forward
             )
-            arm = partial(DrivenArm, heel=prefix + HEEL, tip=prefix + TIP)
-        return arm(spec, path.stem, limits, *settings, others=others)
-
-    try:
-        usual = led()
-        expect_angles(usual.model)
-        usual.reset(_at_first(usual))
-        arm = led(firm_impedance(usual), others=others)
+            heel, tip, forward = prefix + HEEL, prefix + TIP, FORWARD
+        arm = DrivenArm(
+            spec,
+            path.stem,
+            limits,
+            impedance,
+            heel=heel,
+            tip=tip,
+            forward=forward,
+            others=others,
+        )
+        expect_angles(arm.model)
     except ValueError as error:
         raise UsageError(f"[arm] model {path}: {error}") from error
-    arm.reset(_at_first(usual))
+    arm.reset(_at_first(arm))
     return arm
 
 
@@ -143,7 +146,8 @@ def frame_at(pos: Sequence[float], quat: Sequence[float]) -> TissueFrame:
 def _at_first(arm: DrivenArm) -> FloatArray:
     """Return the configuration of the first keyframe, or that of the model without one."""
     first = arm.model.key_qpos[0] if arm.model.nkey else arm.model.qpos0
-    return np.asarray(np.clip(first, *arm.ranges()))
+    low, high = arm.ranges()
+    return np.asarray(np.clip(first[: len(low)], low, high))
 
 
 def move_to_start(

@@ -10,7 +10,9 @@ import numpy as np
 
 from bridge import DeviceLimits, Fixture, TissueFrame
 from scalpel_sim.arm.arm import PSM, DrivenArm
+from scalpel_sim.arm.firm_hand import firm_impedance
 from scalpel_sim.arm.grasper import HALF_PAD, HeldArm
+from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.placement import (
     Placement,
     PlacementError,
@@ -175,10 +177,9 @@ def own_arm_in(
         *arms_with_graspers(scene.graspers, motions, boxes, frame, None, rooms),
         *_in_world(around, frame),
     ]
-    if others:
-        start = np.array(arm.data.qpos)
-        arm, _ = _own(scene, stroke.blade_length, others)
-        arm.reset(start)
+    start = np.array(arm.data.qpos)
+    arm, _ = _own(scene, stroke.blade_length, firm_impedance(arm), others)
+    arm.reset(start)
     return StandingArms(arm, frame, stroke, others, room)
 
 
@@ -218,13 +219,17 @@ def _in_world(around: ArmSurroundings, frame: TissueFrame) -> list[Standing]:
 
 
 def _own(
-    scene: Scene, length: float, others: Sequence[Standing] = ()
+    scene: Scene,
+    length: float,
+    impedance: Impedance = Impedance(),
+    others: Sequence[Standing] = (),
 ) -> tuple[DrivenArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world.
 
     Args:
         scene: The scene.
         length: Length of the edge of a scalpel that it holds [m]; a blade of its own has its own.
+        impedance: How firmly its hand holds the blade.
         others: What else stands in its world.
     """
     own, world = scene.arm, scene.world
@@ -238,6 +243,7 @@ def _own(
     arm = own_arm(
         Path(own.model),
         limits,
+        impedance=impedance,
         mount=mount,
         heel=own.heel,
         tip=own.tip,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import prepare, read_scene
+from scalpel_sim.arm.firm_hand import firm_impedance
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.write import scene_text
@@ -181,6 +182,14 @@ def test_jaws_that_do_not_carry_the_blade_stay_where_they_are(tmp_path):
     _, simulation = mean_force(scene_of(tmp_path, "with_jaws.xml"))
     jaws = [simulation.arm.data.joint(name).qpos[0] for name in ("left", "right")]
     assert jaws == pytest.approx([0.02, 0.02], abs=2e-3)
+
+
+def test_the_hand_is_as_firm_as_suits_the_arm_where_it_works_not_where_its_file_has_it(tmp_path):
+    arm = prepare(scene_of(tmp_path, "seven_hinges.urdf")).arm
+    there, stiffness = firm_impedance(arm), arm.model.actuator_gainprm[arm.hand.actuators[0], 0]
+    arm.reset(np.zeros(7))  # stretched, it does not move along itself
+    assert firm_impedance(arm).stiffness < 0.2 * there.stiffness
+    assert stiffness == pytest.approx(there.stiffness, rel=1e-9)
 
 
 def test_a_scalpel_is_as_long_as_the_stroke_needs_and_as_thick_as_the_blade(tmp_path):
