@@ -16,9 +16,10 @@ from bridge.coupling.limits import DeviceLimits, factor_to_limit, magnitude
 from bridge.device.messages import CartesianPose
 from tissue import FloatArray
 
-SLEW = 40.0
+SLEW = 30.0
 """Rate at which the force changes while the hand rests [N/s], of a force up to 1 N; in proportion
-of a larger one. In a millisecond it is 0.04 N, or 4 %: a hand notices a step of some 0.05 N."""
+of a larger one. In a millisecond it is 0.03 N, or 3 %. A hand notices a step of some 0.05 N: the
+rest is for what it presses itself."""
 
 LONGEST_RAMP = 0.05
 """Longest time in which the force of a frame is approached [s]: after longer ones it fades."""
