@@ -57,8 +57,8 @@ SECONDS = 3.0
 """Length of a motion [s]."""
 
 LATE_GAIN = 5e-3
-"""Energy beyond the debt that a hand gains while the force fades [J]: the largest force here, 2.5 N,
-at 0.2 m/s, half of it, for the 20 ms in which it may fade."""
+"""Energy beyond the debt that a hand gains while the force fades [J]: the largest force here, 2.5
+N, at 0.2 m/s, half of it, for the 20 ms in which it may fade."""
 
 
 def felt_at_rest(frames, per_frame=3):
