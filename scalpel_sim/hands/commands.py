@@ -11,6 +11,10 @@ LONGEST_MESSAGE = 256
 FARTHEST_MOVE = 0.1
 """Largest displacement of one message [m]: more than the width of a body is no hand's."""
 
+FARTHEST_PLACE = 1e3
+"""Largest distance of a place from the origin of the world [m]; the room of an instrument, to which
+a place is clipped, is far smaller."""
+
 FARTHEST_TURN = math.pi / 2.0
 """Largest turn of one message [rad]."""
 
@@ -54,6 +58,15 @@ class Move(_Message, frozen=True, tag="move"):
     """Displacement [m], world frame."""
     stamp: _Stamp
     """Time of the input by the page's clock [ms], to measure how late the picture is."""
+
+
+class Aim(_Message, frozen=True, tag="aim"):
+    """Lead the chosen instrument to a place, and no farther."""
+
+    to: _ThreeNumbers
+    """Where what of it is led is to be [m], world frame."""
+    stamp: _Stamp
+    """See `Move`."""
 
 
 class Turn(_Message, frozen=True, tag="turn"):
@@ -133,7 +146,7 @@ class Begin(_Message, frozen=True, tag="begin"):
     """Whether the page leads the blade in it."""
 
 
-LeadingCommand = Engage | Release | Move | Turn | StillThere | Choose | Jaws | End
+LeadingCommand = Engage | Release | Move | Aim | Turn | StillThere | Choose | Jaws | End
 """What the hand obeys in its next frame."""
 
 RunCommand = Pause | Resume | Step | SlowMotion | Undo | Reset
@@ -156,4 +169,6 @@ def command_of(message: str | bytes) -> Command | None:
         most = FARTHEST_MOVE if isinstance(command, Move) else FARTHEST_TURN
         size = math.hypot(*command.by)
         return command if size <= most else None  # NaN is not
+    if isinstance(command, Aim):
+        return command if math.hypot(*command.to) <= FARTHEST_PLACE else None
     return command

@@ -72,6 +72,25 @@ class LiveInstrument(abc.ABC):
         """What of it is led, in the world [m], shape (3,)."""
         return self._frame.points_to_world(np.array(self.numbers[:3]))
 
+    @property
+    def back(self) -> FloatArray:
+        """Direction from what is led back along the instrument, world frame, shape (3,)."""
+        return self._frame.vectors_to_world(-self._axes()[1])
+
+    @property
+    @abc.abstractmethod
+    def normal(self) -> FloatArray:
+        """Unit normal of the plane in which it works, world frame, shape (3,).
+
+        A blade cuts in its own plane. A grasper goes to tissue, closes and lifts in that of its
+        jaws.
+        """
+
+    def aim(self, to: FloatArray) -> None:
+        """Want what is led to be at a place [m], world frame."""
+        lever = np.array(self.numbers[:3]) - self.pose.middle
+        self.pose.aim(self._frame.points_to_tissue(to) - lever)
+
     @abc.abstractmethod
     def close_jaws(self, closed: bool) -> None:
         """Close or open its jaws, if it has any."""
@@ -86,11 +105,15 @@ class LiveInstrument(abc.ABC):
         """
         if moves and self._record.has_begun:  # the record begins at the start
             if self.pose.step():
-                axes = np.empty(9)
-                mujoco.mju_quat2Mat(axes, self.pose.rotation)
-                self._take_edge(self._edge_at(self.pose.middle, axes.reshape(3, 3).T))
+                self._take_edge(self._edge_at(self.pose.middle, self._axes()))
             self._move_jaws()
         self._record.add(t, [*self.numbers, float(is_engaged)])
+
+    def _axes(self) -> FloatArray:
+        """Return the directions across the edge, along it and back from it, tissue frame."""
+        axes = np.empty(9)
+        mujoco.mju_quat2Mat(axes, self.pose.rotation)
+        return axes.reshape(3, 3).T
 
     @abc.abstractmethod
     def _edge_at(self, middle: FloatArray, axes: FloatArray) -> BladeSegment:
@@ -153,6 +176,11 @@ class LiveBlade(LiveInstrument):
         """Tip, heel and forward of the pose that leads, tissue frame."""
         return self._numbers
 
+    @property
+    def normal(self) -> FloatArray:
+        """See `LiveInstrument.normal`."""
+        return self._frame.vectors_to_world(self._axes()[0])
+
     def close_jaws(self, closed: bool) -> None:
         """Do nothing: it has none."""
 
@@ -206,6 +234,11 @@ class LiveGrasper(LiveInstrument):
     def numbers(self) -> list[float]:
         """Place, approach, across and opening, tissue frame."""
         return [*(float(number) for part in self._at[1:4] for number in part), self._at.opening]
+
+    @property
+    def normal(self) -> FloatArray:
+        """See `LiveInstrument.normal`."""
+        return self._frame.vectors_to_world(self._axes()[2])
 
     def close_jaws(self, closed: bool) -> None:
         """Close or open the jaws."""

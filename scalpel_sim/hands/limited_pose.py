@@ -61,6 +61,14 @@ class LimitedPose:
         self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
         self._is_limited |= math.dist(requested.tolist(), self.wanted.tolist()) > ARRIVED
 
+    def aim(self, to: FloatArray) -> None:
+        """Want it to be at a place [m], as near as its workspace goes.
+
+        Unlike a displacement a place may be far ahead: there it stops.
+        """
+        np.clip(to, *self._workspace, out=self.wanted)
+        self._is_limited |= math.dist(to.tolist(), self.wanted.tolist()) > ARRIVED
+
     def turn(self, by: FloatArray) -> None:
         """Turn the wanted pose by a rotation vector [rad], as far as it may be ahead."""
         turn, turned = np.array([1.0, 0.0, 0.0, 0.0]), np.empty(4)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from bridge import InProcessLink
 from scalpel_sim.hands.commands import (
+    Aim,
     Begin,
     Choose,
     Command,
@@ -327,6 +328,7 @@ RUN_COMMANDS: dict[type[Command], Callable[[RunControls, Any], None]] = {
     Jaws: RunControls.begin_stroke,
     Release: RunControls.pass_on,
     Move: RunControls.pass_on,
+    Aim: RunControls.pass_on,
     Turn: RunControls.pass_on,
     StillThere: RunControls.pass_on,
     Lead: lambda run, _: None,

@@ -11,6 +11,7 @@ import numpy as np
 
 from scalpel_sim.hands.commands import (
     LONGEST_SILENCE,
+    Aim,
     Choose,
     End,
     Engage,
@@ -165,6 +166,12 @@ class LiveHand(Teleoperation):
         if self.is_engaged:
             (pose.move if isinstance(command, Move) else pose.turn)(by)
 
+    def aim(self, command: Aim) -> None:
+        """Lead the chosen instrument to a place, if it is engaged."""
+        self.stamp = command.stamp
+        if self.is_engaged:
+            self.instruments[self.chosen].aim(np.array(command.to))
+
     def close_jaws(self, closed: bool) -> None:
         """Close or open the jaws of the chosen instrument."""
         self.instruments[self.chosen].close_jaws(closed)
@@ -174,6 +181,7 @@ HAND_COMMANDS: dict[type[LeadingCommand], Callable[[LiveHand, Any], None]] = {
     Engage: lambda hand, _: hand.engage(),
     Release: lambda hand, _: hand.release(),
     Move: LiveHand.move,
+    Aim: LiveHand.aim,
     Turn: LiveHand.move,
     Choose: lambda hand, command: hand.choose(command.instrument),
     Jaws: lambda hand, command: hand.close_jaws(command.closed),

@@ -17,9 +17,9 @@ from meshcat.visualizer import ViewerWindow, Visualizer
 from bridge import TissueFrame
 from scalpel_sim.errors import UsageError
 from scalpel_sim.viewer.messages import SceneState
-from scalpel_sim.viewer.model_shapes import Shape
+from scalpel_sim.viewer.model_shapes import Shape, position_and_rotation
 from scalpel_sim.viewer.scene3d import Readings
-from scalpel_sim.viewer.scene_packets import ARROW_LENGTH, TARGET_OPACITY, position_and_rotation
+from scalpel_sim.viewer.scene_packets import ARROW_LENGTH, TARGET_OPACITY
 from tissue import CUT_COLOUR, SKIN_COLOUR, FloatArray, Surface
 
 _log = logging.getLogger(__name__)

@@ -15,6 +15,9 @@ LAST_VISIBLE_GROUP = 2
 """Last geom group that is drawn. MuJoCo's viewer shows the groups 0, 1 and 2 too; the others hold,
 for instance, collision shapes."""
 
+PADS = ("pad_low", "pad_high")
+"""How the names of the pads of graspers end; see `arm/assets/grasper.xml`."""
+
 PLANE_EXTENT = 0.5
 """Half width [m] at which a plane is drawn that is infinite in the model."""
 
@@ -36,10 +39,26 @@ class Shape(NamedTuple):
     """Position [m] and quaternion (w, x, y, z) of the geom in the body's frame, shape (7,)."""
     colour: FloatArray
     """Red, green, blue and opacity between 0 and 1, shape (4,)."""
-    is_blade: bool
-    """Whether the geom is the blade: a box that holds the sites `heel` and `tip` of its body."""
+    edge: tuple[FloatArray, FloatArray] | None
+    """Heel and tip [m] in the geom's frame, if the geom is the blade: a box that holds the sites
+    `heel` and `tip` of its body."""
     is_target: bool
     """Whether the geom only marks the target pose of the hand (a mocap body)."""
+
+    @property
+    def is_blade(self) -> bool:
+        """Whether the geom is the blade."""
+        return self.edge is not None
+
+    @property
+    def is_end(self) -> bool:
+        """Whether the geom is what an arm works with: the blade, or a pad of a grasper."""
+        return self.is_blade or self.name.endswith(PADS)
+
+    @property
+    def is_link(self) -> bool:
+        """Whether the geom is another part of an arm, which may stand before the tissue."""
+        return self.body > 0 and not (self.is_end or self.is_target)
 
 
 def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
@@ -62,7 +81,7 @@ def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
                 mesh=mesh,
                 pose=np.concatenate([model.geom_pos[geom], model.geom_quat[geom]]),
                 colour=colour,
-                is_blade=edge is not None,
+                edge=edge,
                 is_target=bool(model.body_mocapid[body] >= 0),
             )
 
@@ -70,6 +89,13 @@ def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
 def body_poses(data: mujoco.MjData) -> FloatArray:
     """Return position [m] and quaternion (w, x, y, z) of all bodies, shape (n_bodies, 7)."""
     return np.hstack([data.xpos, data.xquat])
+
+
+def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position, shape (3,), and rotation, shape (3, 3), of a pose of shape (7,)."""
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, np.ascontiguousarray(pose[3:]))
+    return pose[:3], matrix.reshape(3, 3)
 
 
 def _colour(model: mujoco.MjModel, geom: int) -> FloatArray:

@@ -136,12 +136,16 @@ def live_state(controls: RunControls) -> LiveState:
 
 def _state_of_hand(hand: Teleoperation) -> HandState:
     """Return how a hand is, for the page that leads it."""
+    chosen = hand.instruments[hand.chosen]
     return HandState(
-        hand.tip,
+        chosen.tip,
+        chosen.back,
+        2.0 * chosen.half,
+        chosen.normal,
         hand.is_engaged,
         hand.ended_at is not None,
         hand.stamp,
         [each.name for each in hand.instruments],
         hand.chosen,
-        hand.instruments[hand.chosen].is_closed,
+        chosen.is_closed,
     )

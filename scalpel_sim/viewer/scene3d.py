@@ -42,6 +42,9 @@ class Appearance(NamedTuple):
     """Properties of the material by their three.js names; colours are 0xRRGGBB in sRGB."""
     maps: Mapping[str, bytes] = {}
     """Textures (PNG) by the name of the property that holds them, for instance `map`."""
+    part: str | None = None
+    """`link` of an arm, which is drawn faint before tissue, or `end`, its blade or a pad, which is
+    not to be hidden; None: neither."""
 
 
 NO_VECTORS = np.zeros((0, 3))
@@ -84,6 +87,12 @@ class HandState(
 
     tip: FloatArray
     """Where the tip of the chosen instrument is led [m], world frame, shape (3,)."""
+    back: FloatArray
+    """Direction from there back along the instrument, world frame, shape (3,)."""
+    length: float
+    """Length of its edge, or of its pads [m]."""
+    normal: FloatArray
+    """Unit normal of the plane in which it works, world frame, shape (3,)."""
     is_engaged: bool
     """Whether it leads that."""
     has_ended: bool
@@ -153,6 +162,7 @@ class Scene3D:
             kind=appearance.kind,
             properties=appearance.properties,
             maps=pictures,
+            part=appearance.part,
         )
 
     def set_mesh(self, path: str, mesh: TriangleMesh, appearance: str) -> None:

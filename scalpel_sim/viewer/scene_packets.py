@@ -11,7 +11,8 @@ from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.messages import SceneState
-from scalpel_sim.viewer.model_shapes import Shape
+from scalpel_sim.viewer.model_shapes import Shape, position_and_rotation
+from scalpel_sim.viewer.own_camera import own_eye
 from scalpel_sim.viewer.primitives import TriangleMesh
 from scalpel_sim.viewer.scene3d import Appearance, Scene3D
 from scalpel_sim.viewer.textures import map_texture
@@ -22,25 +23,6 @@ TISSUE = "/tissue"
 
 TILES_PER_BODY = 2.2
 """Repeats of the texture along the diagonal of the body."""
-
-CAMERA_DISTANCE = 2.4
-"""Distance of the camera from the body's centre, in diagonals of the body. The body then fills a
-third of the page's height, which leaves room for the stylus."""
-
-CAMERA_ELEVATION = float(np.radians(38.0))
-"""Elevation of the camera above the body's centre [rad]."""
-
-CAMERA_AZIMUTHS = np.radians([52.0, 128.0, 232.0, 308.0])
-"""Possible azimuths of the camera from the tissue's x axis [rad]. Strokes cut across that axis:
-from these directions one looks into the opening cut and still sees the flat of the blade."""
-
-ARM_AZIMUTH = float(np.radians(80.0))
-"""Best angle between the directions from the body to the camera and to the arm, seen from above
-[rad]: from the side the arm neither hides the cut nor is hidden by the body."""
-
-HIDING_AZIMUTH = float(np.radians(45.0))
-"""Angle between these directions below which the arm stands before the body [rad]: with two arms
-the best compromise is none where it looks past the back of one."""
 
 TABLE_RADIUS = 4.5
 """Half width of a plane, in diagonals of the body. Planes are infinite in MuJoCo, whatever size the
@@ -80,7 +62,7 @@ _STEEL = {
 _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
 """Properties of the material of painted parts."""
 
-OWN_VIEW = "next to the arms"
+OWN_VIEW = "where the blade enters"
 """Name of the page's own camera; a scene that has a view of this name replaces it."""
 
 HIGHEST_LEVEL = 255
@@ -137,8 +119,8 @@ class ScenePackets:
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
         cameras = [*map(self._camera, self._views)]
         if OWN_VIEW not in [camera.name for camera in cameras]:
-            eye, target = self._eye(centre, body_poses).tolist(), centre.tolist()
-            cameras.append(ViewTable(name=OWN_VIEW, eye=eye, target=target))
+            eye = own_eye(self._shapes, body_poses, surface.positions, self._frame)
+            cameras.append(ViewTable(name=OWN_VIEW, eye=eye.tolist(), target=centre.tolist()))
         scene.set_cameras(cameras, self._diagonal)
         scene.set_wireframe(self._wireframe)
         return scene.take()
@@ -170,7 +152,8 @@ class ScenePackets:
             body_position, body_rotation = position_and_rotation(body_pose)
             below = ((centre - body_position) @ body_rotation - position) @ rotation
             mesh = _plane_around(mesh, below, TABLE_RADIUS * self._diagonal)
-        scene.set_appearance(appearance, _appearance_of(shape))
+        part = "end" if shape.is_end else "link" if shape.is_link else None
+        scene.set_appearance(appearance, _appearance_of(shape)._replace(part=part))
         scene.set_mesh(path, mesh, appearance)
         scene.set_pose(path, position, rotation)
 
@@ -179,28 +162,6 @@ class ScenePackets:
         eye, target = self._frame.points_to_world(np.array([view.eye, view.target])).tolist()
         up = self._frame.vectors_to_world(np.array(view.up)).tolist()
         return replace(view, eye=eye, target=target, up=up)
-
-    def _arms(self, body_poses: FloatArray) -> list[FloatArray]:
-        """Return where each arm is, seen from above: the mean of its bodies [m], shape (2,)."""
-        bodies: dict[int, set[int]] = {}
-        for shape in self._shapes:
-            if shape.body > 0 and not shape.is_target:
-                bodies.setdefault(shape.root, set()).add(shape.body)
-        return [body_poses[sorted(arm), :2].mean(axis=0) for arm in bodies.values()]
-
-    def _eye(self, centre: FloatArray, body_poses: FloatArray) -> FloatArray:
-        """Return the camera's position [m]: above, and next to the lines from the body to arms."""
-        axis = self._frame.rotation[:, 0]
-        azimuths = np.arctan2(axis[1], axis[0]) + CAMERA_AZIMUTHS
-        level = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
-        deviations = np.zeros(len(level))
-        for arm in self._arms(body_poses) or [centre[:2]]:
-            towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)
-            between = np.arccos(np.clip(level @ towards_arm, -1.0, 1.0))
-            deviations += np.abs(between - ARM_AZIMUTH) + np.pi * (between < HIDING_AZIMUTH)
-        flat, up = np.cos(CAMERA_ELEVATION), np.sin(CAMERA_ELEVATION)
-        direction = np.array([*(flat * level[deviations.argmin()]), up])
-        return centre + CAMERA_DISTANCE * self._diagonal * direction
 
 
 def _set_tissue_appearances(scene: Scene3D, diagonal: float, look: Look) -> None:
@@ -238,13 +199,6 @@ def _plane_around(mesh: TriangleMesh, centre: FloatArray, radius: float) -> Tria
     half = np.abs(mesh.positions).max(axis=0)
     scale = np.array([radius / half[0], radius / half[1], 1.0])
     return mesh._replace(positions=mesh.positions * scale + [centre[0], centre[1], 0.0])
-
-
-def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position, shape (3,), and rotation, shape (3, 3), of a pose of shape (7,)."""
-    matrix = np.empty(9)
-    mujoco.mju_quat2Mat(matrix, np.ascontiguousarray(pose[3:]))
-    return pose[:3], matrix.reshape(3, 3)
 
 
 def levels_of(

@@ -24,6 +24,7 @@ _OF_ALL_PAGES = (
     "materials.js",
     "force_marks.js",
     "field_colours.js",
+    "see_through.js",
     "scene_view.js",
     "coarseness.js",
     "controls.js",
@@ -78,7 +79,10 @@ def live_page(
     if is_led:
         bars.insert(0, "hand")
         scripts += [
-            "depth.js",
+            "aim.js",
+            "section.js",
+            "reach.js",
+            "touch.js",
             "hand_input.js",
             "gamepad.js",
             "instruments.js",

@@ -4,7 +4,7 @@
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
 const SILENT_AFTER = 1600; // silence after which the run may have released [ms]
 const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
-const LONGEST_STEP = 5000; // and at most, where no picture shows it
+const LONGEST_STEP = 10000; // and at most, where no picture shows it
 const N_LAGS_SHOWN = 30; // of which the median is shown
 const MOST_LAGS = 2000; // that are kept
 
@@ -17,13 +17,17 @@ class Hand {
         this.isEngaged = false;
         this.hasMoved = false;
         this.hasEnded = false;
+        this.pointer = null; // where it points, while it leads
         this.holders = new Map(); // what holds the blade, and since when it only finishes a step [ms]
         this.instruments = new Instruments(this);
         this.tip = null; // of the chosen instrument in the last picture [m], world frame
         this.isAtRest = true; // whether it was there in the picture before
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
         this.lags = [];
-        this.depth = new Depth(view);
+        this.aim = new Aim(view);
+        this.section = new Section(view);
+        this.reach = new Reach(this);
+        this.fingers = new TwoFingers(view.viewer);
         view.onHand = (state) => this.show(state);
         run.onChange = () => this.onRunChange();
         run.onInterruption = () => this.forget();
@@ -42,6 +46,11 @@ class Hand {
         listenToKeys(this);
         listenToGamepads(this);
         this.showControls();
+    }
+
+    // Whether fingers are what this device has.
+    get isTouched() {
+        return window.matchMedia("(pointer: coarse)").matches;
     }
 
     // Whether the input of this page leads the blade.
@@ -94,7 +103,16 @@ class Hand {
         }
     }
 
+    // The pointer has let go: the blade goes on to where it pointed last.
+    finish(holder) {
+        this.aim.letGo();
+        this.pointer = null;
+        if (this.holders.has(holder)) this.holders.set(holder, performance.now());
+    }
+
     letGoOfAll() {
+        this.aim.letGo();
+        this.pointer = null;
         for (const holder of [...this.holders.keys()]) this.letGo(holder);
     }
 
@@ -112,6 +130,25 @@ class Hand {
     // Turn by a rotation vector about the axes [right, up, away] of the view [rad].
     turn(by, stamp) {
         this.lead({ type: "turn", by: this.inWorld(by), stamp });
+    }
+
+    // Move by a vector of three.js [m] as one step.
+    step(holder, by, stamp) {
+        this.hold(holder, true);
+        this.lead({ type: "move", by: turnedBack(by), stamp });
+    }
+
+    // Lead what is chosen to a place of the window, in its plane.
+    aimAt(clientX, clientY, stamp) {
+        if (!this.isEngaged || !this.isClosed) return;
+        if (this.aim.held === null) this.aim.take();
+        this.pointer = [clientX, clientY];
+        this.lead({ type: "aim", to: this.aim.at(clientX, clientY), stamp });
+    }
+
+    // The depth or the plane is another now.
+    aimAgain(stamp) {
+        if (this.pointer !== null) this.aimAt(...this.pointer, stamp);
     }
 
     lead(message) {
@@ -134,18 +171,9 @@ class Hand {
         return [vector.x, -vector.z, vector.y];
     }
 
-    // Length of a pixel in the plane of the screen through the tip.
-    metresPerPixel() {
-        const { camera, renderer } = this.viewer;
-        camera.updateMatrixWorld();
-        const [x, y, z] = this.tip;
-        const depth = -new THREE.Vector3(x, z, -y).applyMatrix4(camera.matrixWorldInverse).z;
-        const height = 2 * depth * Math.tan(camera.fov * Math.PI / 360) / camera.zoom;
-        return height / renderer.domElement.clientHeight;
-    }
-
     // A picture says how the hand is in it.
-    show({ tip, engaged, ended, stamp, instruments, chosen, closed }) {
+    show(state) {
+        const { tip, engaged, ended, stamp, instruments, chosen, closed } = state;
         this.instruments.show(instruments, chosen, closed);
         this.isAtRest = this.tip !== null && tip.every((x, axis) => x === this.tip[axis]);
         this.tip = tip;
@@ -154,7 +182,10 @@ class Hand {
         document.body.classList.toggle("engaged", engaged);
         element("take-over").disabled = engaged;
         if (stamp !== null) this.noteLags(stamp);
+        this.aim.show(state);
+        this.reach.show(state);
         this.showControls();
+        this.section.show(state, this.aim.mark.visible && closed === null);
     }
 
     // Each input up to the stamp is in the picture that is drawn next.
@@ -176,6 +207,8 @@ class Hand {
         controls.mouseButtons.LEFT = this.isClosed ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
         element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
         element("clutch").textContent = `lead the ${this.instruments.noun}`;
+        this.aim.mark.visible = this.isClosed;
+        this.reach.enable(this.isClosed);
         this.instruments.enable(this.run.leads && !this.hasEnded);
         element("clutch").disabled = !this.run.leads || this.hasEnded;
         element("hint").textContent = this.hint();
@@ -189,7 +222,12 @@ class Hand {
         if (!this.run.leads) return "Another tab leads the blade.";
         if (this.isClutchOpen) return `Drags turn the view. Space: lead the ${noun} again.`;
         if (this.run.isPaused) return "Time stands still: press \"continue\", or K";
-        if (this.hasMoved) return this.depth.hint(this.tip);
-        return `Press on the picture and drag: the ${noun} follows`;
+        const isBlade = this.instruments.isClosed === null;
+        if (isBlade && this.section.isMissed) return "The blade passes next to the body: move it \"sideways\"";
+        if (this.hasMoved) return "";
+        const [press, turn] = this.isTouched ? ["Put a finger", ". Two fingers turn the view"] : ["Press", ""];
+        return isBlade
+            ? `${press} on the body and drag across it: the ${noun} goes there, along the white line${turn}`
+            : `${press} on the picture and drag: the ${noun} goes there, in the plane of its jaws${turn}`;
     }
 }

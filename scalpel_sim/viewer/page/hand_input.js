@@ -1,4 +1,4 @@
-// Mouse, touch, wheel and keys that lead the blade. Each reports to the hand how far to move or to turn, in
+// Mouse, touch, wheel and keys that lead the blade. Keys report to the hand how far to move or to turn, in
 // the axes of the view: to the right, up, and away from the eye.
 "use strict";
 
@@ -13,43 +13,61 @@ const STEPS = {
     PageUp: [0, 0, 1], PageDown: [0, 0, -1],
 };
 
-// A drag in the plane of the screen through the tip. With Shift it turns.
+// A press and a drag send the instrument to what lies under the pointer; with Shift they turn it. A second
+// finger lets go of it.
 function listenToPointer(pane, canvas, hand) {
     let last = null;
+    const { fingers } = hand;
     pane.addEventListener("pointerdown", (event) => {
         if (event.button !== 0 || event.ctrlKey || event.target !== canvas || !hand.isClosed) return;
         event.stopPropagation(); // it does not turn the view
+        if (event.pointerType === "touch") fingers.down(event);
+        if (fingers.isTurning) {
+            if (last !== null) hand.letGo("pointer");
+            hand.aim.letGo();
+            last = null;
+            return;
+        }
         if (last !== null) return;
         last = event;
         pane.setPointerCapture(event.pointerId);
         hand.hold("pointer");
+        if (!event.shiftKey) hand.aimAt(event.clientX, event.clientY, event.timeStamp);
     }, { capture: true });
     pane.addEventListener("pointermove", (event) => {
+        if (fingers.isTurning) {
+            event.stopPropagation();
+            return fingers.move(event);
+        }
         if (last === null || event.pointerId !== last.pointerId) return;
         event.stopPropagation();
+        fingers.move(event);
         const right = event.clientX - last.clientX, up = last.clientY - event.clientY;
         last = event;
         if (event.shiftKey) {
+            hand.aim.letGo();
             hand.turn([-up * TURN_PER_PIXEL, right * TURN_PER_PIXEL, 0], event.timeStamp);
         } else {
-            const metres = hand.metresPerPixel();
-            hand.move([right * metres, up * metres, 0], event.timeStamp);
+            hand.aimAt(event.clientX, event.clientY, event.timeStamp);
         }
     }, { capture: true });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
         pane.addEventListener(end, (event) => {
+            fingers.up(event);
             if (last === null || event.pointerId !== last.pointerId) return;
             last = null;
-            hand.letGo("pointer");
+            hand.finish("pointer");
         }, { capture: true });
     }
     pane.addEventListener("wheel", (event) => {
         if (event.ctrlKey || event.target !== canvas || !hand.isClosed) return;
         event.stopPropagation();
         event.preventDefault();
-        const pixels = event.deltaY * (event.deltaMode === 0 ? 1 : PIXELS_PER_LINE);
-        hand.hold("wheel", true);
-        hand.move([0, 0, -pixels * DEPTH_PER_WHEEL_PIXEL], event.timeStamp);
+        // With Shift browsers turn the wheel sideways.
+        const pixels = (event.deltaY || event.deltaX) * (event.deltaMode === 0 ? 1 : PIXELS_PER_LINE);
+        const { reach, aim } = hand, metres = -pixels * DEPTH_PER_WHEEL_PIXEL;
+        if (event.shiftKey) reach.setSideways(reach.sideways + metres, event.timeStamp);
+        else reach.setDepth(aim.depth + metres, event.timeStamp);
     }, { capture: true, passive: false });
 }
 

@@ -5,6 +5,10 @@
 const WIRE_COLOUR = 0xffe4d8; // on faces
 const GRID_COLOURS = { skin: 0x24323a, cut: 0xa3121a }; // of edges without faces
 const FAINT = 0.12; // opacity of the skin where the cut is shown alone
+const NARROWEST = 0.75; // width of a window over its height, from which on a body fits in as it is
+const ABOVE_THE_PANELS = {
+    enabled: true, fullWidth: 1, fullHeight: 1, width: 1, height: 1, offsetX: 0, offsetY: 0.06, // of the height
+};
 const CONTACT_SCALE = 30; // magnification: about thirty contacts along the edge share the force
 const SMALLEST_ARROW = 0.02; // [N]; the arrow of a smaller force would be too small to see
 
@@ -22,6 +26,7 @@ class SceneView {
         this.room = room();
         this.filteredRoom = this.isSoftware ? null : filtered(this.room, this.viewer.renderer);
         this.appearances = new Map();
+        this.parts = new Map(); // which are of links of arms, or of their ends
         this.plain = new Map(); // the same for coarse pictures
         this.isPlain = false;
         this.wires = new Map();
@@ -65,11 +70,15 @@ class SceneView {
         new ResizeObserver(() => viewer.set_3d_pane_size()).observe(viewer.dom_element);
     }
 
-    setAppearance({ name, kind, properties, maps }) {
+    setAppearance({ name, kind, properties, maps, part = null }) {
         const redraw = () => this.viewer.set_dirty();
-        const material = materialOf(kind, properties, maps, this.room, redraw);
-        this.appearances.set(name, this.filteredRoom ? richOf(material, this.filteredRoom) : material);
-        this.plain.set(name, plainOf(material));
+        const described = materialOf(kind, properties, maps, this.room, redraw);
+        const material = this.filteredRoom ? richOf(described, this.filteredRoom) : described;
+        const plain = plainOf(described);
+        for (const each of [material, plain]) treatMarks(each, part);
+        this.parts.set(name, part);
+        this.appearances.set(name, material);
+        this.plain.set(name, plain);
     }
 
     // Returns whether the object is a mesh with a shared appearance. meshcat handles all others.
@@ -95,6 +104,7 @@ class SceneView {
         }
         node.object.userData.appearance = appearance;
         if (path[0] === "tissue") this.addTissue(path[1], node.object);
+        else drawInTurn(node.object, this.parts.get(appearance), material);
         return true;
     }
 
@@ -172,6 +182,8 @@ class SceneView {
             mesh.material = this.colours.isThere
                 ? this.colours.materials.get(part)
                 : this.materialCalled(mesh.userData.appearance);
+            treatMarks(mesh.material, "body");
+            drawInTurn(mesh, "body");
             mesh.castShadow = !isFaint;
             const { material } = mesh;
             material.visible = !isGrid; // the edges are children of the mesh, and stay
@@ -197,9 +209,11 @@ class SceneView {
 
     // Up is z in the scene and y in three.js. meshcat turns the scene; the camera is turned here.
     setCamera({ eye, target, up, fov }, extent) {
-        const turned = ([x, y, z]) => new THREE.Vector3(x, z, -y);
         const { camera, controls } = this.viewer;
+        const { clientWidth, clientHeight } = this.viewer.renderer.domElement;
+        eye = framed(eye, target, clientWidth / clientHeight);
         const distance = Math.hypot(...eye.map((x, axis) => x - target[axis]));
+        camera.view = ABOVE_THE_PANELS;
         camera.position.copy(turned(eye));
         camera.up.copy(turned(up)).normalize();
         camera.fov = fov;
@@ -233,6 +247,16 @@ class SceneView {
         this.viewer.set_dirty();
     }
 }
+
+// A window higher than wide shows less to the sides: there the eye is farther away.
+function framed(eye, target, aspect) {
+    const farther = Math.max(1, NARROWEST / aspect);
+    return eye.map((x, axis) => target[axis] + farther * (x - target[axis]));
+}
+
+// Up is z in the scene, and y in three.js.
+const turned = ([x, y, z]) => new THREE.Vector3(x, z, -y);
+const turnedBack = ({ x, y, z }) => [x, -z, y];
 
 function geometryOf({ attributes, index }) {
     const geometry = new THREE.BufferGeometry();

@@ -1,6 +1,5 @@
 """A visitor leads a grasper and the blade in the live page: by gamepad, touch and controls."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +9,12 @@ from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.runs.file_names import FORCES
 from tests.scalpel_sim.hands.driven_view import DrivenView, assert_a_run_repeats
 from tests.scalpel_sim.hands.test_driven_page import (
-    LAID_BARE,
     end,
     opened,
     tip,
     until_it_rests,
     until_the_tip_rests,
 )
-from tests.support.browser import TIMEOUT, WINDOW
 
 pytestmark = pytest.mark.end_to_end
 
@@ -170,7 +167,9 @@ def test_the_controls_of_the_page_choose_an_instrument_and_say_what_the_jaws_wil
     assert tab.is_hidden("#jaws")
     tab.select_option("#instrument", "1")
     tab.wait_for_function("element('clutch').textContent === 'lead the left grasper'")
-    assert tab.inner_text("#hint") == "Press on the picture and drag: the left grasper follows"
+    assert tab.inner_text("#hint") == (
+        "Press on the picture and drag: the left grasper goes there, in the plane of its jaws"
+    )
     assert tab.inner_text("#jaws") == "close the jaws"
 
     def says(action, label):
@@ -206,62 +205,3 @@ def test_the_right_stick_leads_in_depth_and_turns(view, tab):
     lead(tab, TILT, [2, 1.0, 0.3])
     assert np.linalg.norm(tip(tab) - before) > LEAST_STEP
     end(tab, view)
-
-
-@pytest.mark.browser
-def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
-    context = browser.new_context(viewport=WINDOW, has_touch=True, bypass_csp=True)
-    tab = context.new_page()
-    tab.set_default_timeout(TIMEOUT)
-    tab.failures = []
-    tab.on("pageerror", lambda error: tab.failures.append(str(error)))
-    tab.goto(view.url)
-    tab.wait_for_function("hand.tip !== null && run.leads")
-    right, up, away, metres = tab.evaluate(
-        "[hand.inWorld([1, 0, 0]), hand.inWorld([0, 1, 0]), hand.inWorld([0, 0, 1]), "
-        "hand.metresPerPixel()]"
-    )
-    before, (x, y) = tip(tab), tab.evaluate(LAID_BARE)
-    pixels = 0.004 / metres
-    device = context.new_cdp_session(tab)
-
-    def touch(kind, *points):
-        device.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
-
-    touch("touchStart", {"x": x, "y": y})
-    for share in np.linspace(0.0, 1.0, 20):
-        touch("touchMove", {"x": x + share * pixels, "y": y - 0.5 * share * pixels})
-    tab.wait_for_function("hand.isEngaged && hand.unshown.length === 0 && hand.isAtRest")
-    touch("touchEnd")  # what is not done by then is lost
-    until_it_rests(tab)
-    way = tip(tab) - before
-    assert way @ right == pytest.approx(0.004, rel=0.05)
-    assert way @ up == pytest.approx(0.002, rel=0.05)
-    assert way @ away == pytest.approx(0.0, abs=1e-6)
-    end(tab, view)
-    context.close()
-
-
-@pytest.mark.browser
-def test_the_hint_says_how_far_the_body_is_in_depth(view, tab):
-    """The tip is thought to be on the line from the eye to the middle of the body."""
-    hint = tab.evaluate("""() => {
-        hand.hasMoved = true;
-        const { mesh } = hand.view.tissue.get("skin");
-        const middle = new THREE.Box3().setFromObject(mesh).getCenter(new THREE.Vector3());
-        const eye = hand.viewer.camera.getWorldPosition(new THREE.Vector3());
-        const away = middle.clone().sub(eye).normalize();
-        return [-0.07, -0.05, 0, 0.05].map((metres) => {
-            const { x, y, z } = middle.clone().addScaledVector(away, metres);
-            hand.tip = [x, -z, y];
-            hand.depth.lookedAt = -Infinity;
-            return hand.hint();
-        });
-    }""")
-    far, near = (
-        int(re.search(r"is (\d+) mm further away: .*Page Up", each)[1]) for each in hint[:2]
-    )
-    assert far - near == pytest.approx(20, abs=5)
-    assert 25 <= near <= 50
-    assert hint[2] == ""
-    assert re.search(r"is \d+ mm nearer to you: .*Page Down", hint[3])

@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from scalpel_sim.runs.file_names import STROKE, SUMMARY
-from tests.scalpel_sim.hands.driven_view import DrivenView, assert_a_run_repeats
+from scalpel_sim.runs.file_names import SUMMARY
+from tests.scalpel_sim.hands.driven_view import DrivenView
 from tests.support.browser import new_tab
 
 pytestmark = pytest.mark.end_to_end
@@ -20,15 +20,6 @@ PAUSE = 0.03
 
 LONGEST_LAG = 30.0
 """Time in which a picture shows what was done on a machine that is very busy [s]."""
-
-PIXELS_TO = """(way) => {
-    // The drag that moves the blade by that much along x and y of the world.
-    const right = hand.inWorld([1, 0, 0]), up = hand.inWorld([0, 1, 0]);
-    const size = right[0] * up[1] - right[1] * up[0];
-    const across = (way[0] * up[1] - way[1] * up[0]) / size;
-    const upwards = (way[1] * right[0] - way[0] * right[1]) / size;
-    return [across, -upwards].map((metres) => metres / hand.metresPerPixel());
-}"""
 
 HOLD_STICK = """([x, y, isPressed]) => {
     const buttons = Array.from({ length: 17 }, (_, i) => ({ pressed: i === 0 && isPressed }));
@@ -119,24 +110,6 @@ def end(tab, view):
 
 def pieces(view):
     return json.loads((view.folder / SUMMARY).read_text())["pieces"]
-
-
-@pytest.mark.browser
-@pytest.mark.parametrize("view", ["organ"], indirect=True)
-def test_a_mouse_cuts_the_organ_in_two_and_a_run_of_the_record_has_the_same_bits(
-    view, browser, tmp_path
-):
-    tab = opened(browser, view)
-    assert tab.inner_text("#hint") == "Press on the picture and drag: the blade follows"
-    for way in ([0.0, 0.04], [0.0, 0.04], [0.0, 0.02]):
-        drag(tab, *tab.evaluate(PIXELS_TO, way))
-    assert tab.is_hidden("#hint")
-    until_it_rests(tab)
-    assert "from hand to picture" in tab.inner_text("#lag")
-    end(tab, view)
-    assert pieces(view) == 2
-    assert_a_run_repeats(view.folder, tmp_path / "again")
-    assert (view.folder / STROKE).exists()
 
 
 @pytest.mark.browser

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
-from scalpel_sim.hands.commands import LONGEST_SILENCE, Engage, Release, StillThere
+from scalpel_sim.hands.commands import LONGEST_SILENCE, Aim, Engage, Release, StillThere
 from scalpel_sim.hands.limited_pose import (
     ARRIVED,
     FARTHEST_AHEAD,
@@ -65,6 +65,27 @@ def test_an_engaged_hand_arrives_where_it_was_moved_to(hand):
     forward, turned = found[0, 6:], found[-1, 6:]
     assert np.arccos(forward @ turned) == pytest.approx(0.1, abs=1e-5)
     assert (found[-1] == found[-50]).all(), "it rests there"
+
+
+def test_an_engaged_hand_goes_to_a_place_however_far_it_is_and_stops_there(hand, at_start):
+    simulation = at_start[0]
+    to = hand.tip + np.array([0.002, 1.5 * FARTHEST_AHEAD, 0.0])
+    beyond = to + np.array([0.0, 10.0, 0.0])
+    hand.commands += [Engage(), Aim(to.tolist(), 1.0)]
+    found = poses(hand, 900)
+    assert simulation.frame.points_to_world(found[-1, :3]) == pytest.approx(to, abs=1e-6)
+    assert np.linalg.norm(np.diff(found[:, :3], axis=0), axis=1).max() <= MOST_SPEED * DT + ROUNDING
+    assert hand.stamp == 1.0
+    assert hand.n_limited > 0, "its speed is that of a hand"
+    hand.commands.append(Aim(beyond.tolist(), 2.0))
+    middle = middles(poses(hand, 900))[-1]
+    assert middle[1] == pytest.approx(simulation.workspace[1, 1], abs=1e-6)
+
+
+def test_a_released_hand_goes_to_no_place(hand):
+    hand.commands.append(Aim((hand.tip + 0.01).tolist(), 1.0))
+    found = poses(hand, 50)
+    assert (found == found[0]).all()
 
 
 def test_no_move_is_faster_than_the_limits(hand):

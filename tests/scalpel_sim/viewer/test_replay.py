@@ -153,7 +153,7 @@ def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
     tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
     select = tab.get_by_role("combobox", name="view", exact=True)
     names = select.evaluate("(list) => [...list.options].map((option) => option.text)")
-    assert names == ["above", "<side>", "next to the arms"]
+    assert names == ["above", "<side>", "where the blade enters"]
 
     def seen(point):  # across and up in the picture, from -1 to 1
         return tab.evaluate(SEEN, FRAME.points_to_world(np.array(point)).tolist())
@@ -165,7 +165,7 @@ def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
     assert select.input_value() == "1"
     height = 0.01 / (0.3 * np.tan(np.radians(10.0)))
     assert seen([0.0, 0.0, 0.01]) == pytest.approx([0.0, height], abs=1e-6)
-    select.select_option("next to the arms")
+    select.select_option("where the blade enters")
     own = tab.evaluate("viewer.camera.position.toArray()")
     tab.keyboard.press("9")
     # With each picture the controls of the view may round the place anew.
