@@ -6,6 +6,7 @@ object lives: steps of a small body took 7 % longer once its state had been save
 """
 
 import gc
+import inspect
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
@@ -84,7 +85,7 @@ def _names_and_defaults(kind: type) -> _Defaults:
         for member in vars(base).values():
             for code in _codes_of(member):
                 names.update(dict.fromkeys(code.co_names, _NONE))
-        names.update(dict.fromkeys(vars(base).get("__annotations__", ()), _NONE))
+        names.update(dict.fromkeys(inspect.get_annotations(base), _NONE))
     for name in names:
         names[name] = getattr(kind, name, _NONE)
     return {name: of for name, of in names.items() if not hasattr(of, "__get__")}

@@ -15,7 +15,7 @@ import inspect
 from array import array
 from collections.abc import Mapping
 from operator import attrgetter
-from typing import Annotated, Any, ClassVar, NoReturn, Self, get_args
+from typing import Annotated, Any, ClassVar, NoReturn, Self
 
 import numpy as np
 from llvmlite import ir
@@ -33,6 +33,7 @@ from numba.extending import (
 )
 from numba.np import arrayobj, numpy_support
 
+from tissue.core.array_types import element_type
 from tissue.core.sized import Sized
 from tissue.core.vec3 import Vec3
 
@@ -187,7 +188,7 @@ class Arrays:
         made: dict[str, Any] = dict.fromkeys(cls._cells, 0)
         for name, each in cls._sized.items():
             if name not in fields:
-                dtype = get_args(get_args(cls.__annotations__[name])[1])[0]
+                dtype = element_type(cls.__annotations__[name])
                 is_real = each.is_for_vectors and dtype is np.float64
                 made[name] = each.array(sizes, real if is_real else dtype)
         return cls(**(made | fields))
@@ -209,7 +210,8 @@ class Arrays:
 
     def replaced(self, **fields: Any) -> Self:
         """Return a struct with these fields in place of its own; cells are copied."""
-        return type(self)(**{name: getattr(self, name) for name in self.__annotations__} | fields)
+        kind = type(self)  # from Python 3.14 on an object has no annotations
+        return kind(**{name: getattr(self, name) for name in kind.__annotations__} | fields)
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be pickled or copied: the table of the copy would hold these addresses.
