@@ -22,8 +22,8 @@ LEAST_CUT = 200e-6
 
 SMALL_CUTS = {"skin": 35e-6, "retract": 60e-6}
 """Where it is less [m2]. A section of `skin` has 100 mm2, of which the depth at first reaches 75,
-and tough skin gives way before it parts: half of these. In `retract` the blade lies with its edge up
-under a lobe that is to be lifted first; a drag thrusts its point in."""
+and tough skin gives way before it parts: half of these. In `retract` the blade lies with its edge
+up under a lobe that is to be lifted first; a drag thrusts its point in."""
 
 STEPS, PAUSE = 20, 0.04
 """Moves of a drag, and the time between two of them [s]."""
