@@ -148,7 +148,7 @@ def _lags_in(url: str, width: int, height: int) -> tuple[FloatArray, str]:
         # It waits for texts, which the policy of the page forbids to evaluate.
         tab = chromium.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
         tab.goto(url)
-        tab.wait_for_function("hand.isClosed")
+        tab.wait_for_function("hand.isClosed && element('loading').hidden")
         x, y = width / 2, 0.45 * height
         tab.mouse.move(x, y)
         tab.mouse.down()

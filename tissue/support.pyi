@@ -1,4 +1,4 @@
-from .core.array_types import element_type as element_type
+from .core.array_types import dtype_of as dtype_of
 from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
@@ -17,7 +17,7 @@ from .mesh.pieces import components as components
 from .state.tissue_state import Around as Around
 
 __all__ = [
-    "element_type",
+    "dtype_of",
     "LEVELS",
     "Around",
     "Memento",

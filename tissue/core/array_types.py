@@ -12,7 +12,7 @@ SlotArray = npt.NDArray[np.int32]
 BoolArray = npt.NDArray[np.bool_]
 
 
-def element_type(array_type: Any) -> Any:
+def dtype_of(array_type: Any) -> Any:
     """Return the type of the elements of a type of arrays, such as np.float64 of `FloatArray`.
 
     From NumPy 2.5 on the type is an alias, whose argument is that of the elements; before, an

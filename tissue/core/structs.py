@@ -33,7 +33,7 @@ from numba.extending import (
 )
 from numba.np import arrayobj, numpy_support
 
-from tissue.core.array_types import element_type
+from tissue.core.array_types import dtype_of
 from tissue.core.sized import Sized
 from tissue.core.vec3 import Vec3
 
@@ -188,7 +188,7 @@ class Arrays:
         made: dict[str, Any] = dict.fromkeys(cls._cells, 0)
         for name, each in cls._sized.items():
             if name not in fields:
-                dtype = element_type(cls.__annotations__[name])
+                dtype = dtype_of(cls.__annotations__[name])
                 is_real = each.is_for_vectors and dtype is np.float64
                 made[name] = each.array(sizes, real if is_real else dtype)
         return cls(**(made | fields))

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.tcp.wire import LARGEST_REPLY, MessageError
-from tissue.support import element_type
+from tissue.support import dtype_of
 
 _T = TypeVar("_T")
 
@@ -201,7 +201,7 @@ def _field_part(name: str, hint: Any, fields: dict[str, Any]) -> Part:
     kind = alone[0] if type(None) in get_args(hint) else hint
     given = fields.get(name, kind)
     if isinstance(given, tuple):
-        return Array(element_type(kind), given, name)
+        return Array(dtype_of(kind), given, name)
     return _part_of(given)
 
 
