@@ -10,8 +10,6 @@ from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.strokes.asked import asked_area
-from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
-from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.moved_scenes import moved
 from tests.support.battery import battery
 from tissue import pieces_of
@@ -194,21 +192,3 @@ def test_both_arms_stand_on_one_table_with_their_instruments_where_their_ways_be
     assert left.grasper.opening == pytest.approx(scene.graspers[0].motion[0].opening)
     tip = frame.points_to_world(simulation.stroke.pose(0.0).tip)
     assert simulation.arm.blade.segment().tip == pytest.approx(tip, abs=1e-5)
-
-
-@EACH
-def test_the_camera_stands_before_neither_arm(scene):
-    simulation = prepare(scene)
-    model, data, surface = simulation.arm.model, simulation.arm.data, simulation.link.surface()
-    packets = ScenePackets(shapes_of(model), simulation.frame)
-    opening = msgspec.msgpack.decode(
-        packets.opening(surface, body_poses(data)), ext_hook=lambda code, body: bytes(body)
-    )
-    (cameras,) = [each for each in opening["commands"] if each["type"] == "set_cameras"]
-    (camera,) = cameras["cameras"]
-    towards_eye = np.subtract(camera["eye"], camera["target"])[:2]
-    for base in (data.body("base"), data.body("left_base")):
-        towards_base = (base.xpos - camera["target"])[:2]
-        cosine = towards_eye @ towards_base
-        cosine /= np.linalg.norm(towards_eye) * np.linalg.norm(towards_base)
-        assert cosine < np.cos(np.radians(40.0))

@@ -54,7 +54,7 @@ function drawScale(context, width, height) {
 // Labels and values, as the page shows them.
 function shownReadings() {
     if (element("readings").hidden) return [];
-    return [...document.querySelectorAll("#readings > div:not([hidden])")]
+    return [...document.querySelectorAll("#readings dl > div:not([hidden])")]
         .filter((row) => row.querySelector("dt"))
         .map((row) => [row.querySelector("dt").textContent, row.querySelector("dd").textContent]);
 }

@@ -75,6 +75,7 @@ def test_a_machine_that_is_too_slow_at_all_levels_draws_the_coarsest(tab):
 def test_what_moves_is_drawn_as_coarsely_as_needed_and_what_rests_in_full(tab):
     drawn = """[sceneView.lights.lamp.castShadow, viewer.renderer.getPixelRatio(),
         sceneView.tissue.get("skin").mesh.material.type]"""
+    tab.wait_for_function("coarseness.drawn === 0")
     fine = tab.evaluate(drawn)
     in_full = pixels(tab)
     tab.evaluate("coarseness.levels.level = LEVELS.length - 1, coarseness.onChange()")

@@ -155,7 +155,7 @@ def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
     names = select.evaluate("(list) => [...list.options].map((option) => option.text)")
     assert names == ["above", "<side>", "where the blade enters"]
 
-    def seen(point):  # across and up in the picture, from -1 to 1
+    def seen(point):  # across and up from the target in the picture, where half of it is 1
         return tab.evaluate(SEEN, FRAME.points_to_world(np.array(point)).tolist())
 
     across, up = seen([0.02, 0.04, 0.0])
@@ -185,7 +185,7 @@ SEEN = """(point) => {
     viewer.camera.updateMatrixWorld();
     const [x, y, z] = point;
     const seen = new THREE.Vector3(x, z, -y).project(viewer.camera);
-    return [seen.x, seen.y];
+    return [seen.x, seen.y - 2 * viewer.camera.view.offsetY];
 }"""
 
 
