@@ -45,7 +45,6 @@ def test_a_bundle_of_a_level_serves_a_run_in_a_fresh_home(tmp_path):
     command = [*PROGRAM, "warm-up", "grid2", "--target", level, "--out", file, "--json"]
     made = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
     assert json.loads(made.stdout)["programs"] > 50
-    assert "compiling kernels" in made.stderr
     fresh = {"HOME": str(tmp_path / "home"), "SCALPEL_SIM_BUNDLE": str(file)}
     variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     ran = subprocess.run(
