@@ -109,7 +109,7 @@ class Aim {
         const led = this.goal === null ? tip : tip.clone().addScaledVector(this.tool.into, -this.depth);
         this.mark.place(turnedBack(led), turnedBack(tip), RING.radius * this.view.extent);
         this.mark.face(this.viewer.camera);
-        this.viewer.set_dirty();
+        coarseness.showMarks();
     }
 }
 

@@ -20,6 +20,7 @@ const N_DRAWINGS = 4; // whose median it is
 const N_QUICK = 12; // that must have been quick before a finer level is tried
 const N_UNCOUNTED = 2; // after a change: they make shaders
 const REST_BEFORE_FINE = 400; // [ms]
+const SOON = 250; // [ms]: where no picture comes so long, a mark that moved is drawn without one
 
 // The level of pictures that change, from the times that pictures took.
 class Levels {
@@ -78,14 +79,28 @@ class Coarseness {
         this.drawn = 0; // the level that is drawn
         this.isLed = false;
         this.timer = null;
+        this.marksTimer = null; // while marks wait for a picture
         view.viewer.controls.addEventListener("change", () => this.onChange());
     }
 
     // The picture changes: draw it for one that moves, until it rests.
     onChange() {
+        clearTimeout(this.marksTimer);
+        this.marksTimer = null;
         this.draw(this.levels.level);
         clearTimeout(this.timer);
         this.timer = setTimeout(() => this.draw(0), REST_BEFORE_FINE);
+    }
+
+    // Marks of a pointer have moved, of which there are several between two pictures: by software the next
+    // picture shows them, as drawing each would make it late.
+    showMarks() {
+        const { viewer, isSoftware } = this.view;
+        if (!isSoftware) return viewer.set_dirty();
+        this.marksTimer ??= setTimeout(() => {
+            this.marksTimer = null;
+            viewer.set_dirty();
+        }, SOON);
     }
 
     draw(level) {
