@@ -46,7 +46,7 @@ Path6 = Callable[[float], tuple[FloatArray, FloatArray]]
 
 
 class _Answers(NamedTuple):
-    """What a device got."""
+    """Answers that a device got."""
 
     taken: FloatArray
     """Time from each request to its reply [s]."""
@@ -63,6 +63,11 @@ class _Answers(NamedTuple):
     def jump(self) -> float:
         """Largest change of the force from one answer to the next [N]."""
         return float(np.linalg.norm(np.diff(self.forces, axis=0), axis=1).max())
+
+    @property
+    def most_force(self) -> float:
+        """Largest force of an answer [N]."""
+        return float(np.linalg.norm(self.forces, axis=1).max())
 
 
 def device_link(scene: str = "organ", /, *, seconds: float = 60.0) -> BenchmarkResult:
@@ -112,10 +117,11 @@ def device_link(scene: str = "organ", /, *, seconds: float = 60.0) -> BenchmarkR
         ("replies within 1 ms", "%", 100.0 * np.mean(led.taken < 1e-3)),
         ("slowest of a thousand", "ms", 1e3 * np.quantile(led.taken, 0.999)),
         ("largest jump of force", "N", led.jump),
-        ("largest force", "N", np.linalg.norm(led.forces, axis=1).max()),
+        ("largest force", "N", led.most_force),
         ("at 100 mm/s: farthest apart", "mm", 1e3 * parted.distances.max()),
         ("back: apart", "mm", 1e3 * parted.distances[-1]),
         ("out and back: largest jump", "N", parted.jump),
+        ("out and back: largest force", "N", parted.most_force),
         *((f"until rest after {name}", "ms", 1e3 * rest) for name, rest in rests.items()),
         (f"fastest, limit {MOST_HURRY * limits.most_speed:g}", "m/s", speed),
         (f"fastest turn, limit {MOST_HURRY * limits.most_turn_rate:g}", "rad/s", turn_rate),
