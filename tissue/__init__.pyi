@@ -30,6 +30,7 @@ from .integrators.methods import RELAXATIONS as RELAXATIONS
 from .integrators.methods import Global as Global
 from .integrators.methods import Hierarchical as Hierarchical
 from .integrators.methods import Verlet as Verlet
+from .io.mesh_io import mesh_from_arrays as mesh_from_arrays
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .laws import LAWS as LAWS
@@ -160,6 +161,7 @@ __all__ = [
     "fixed_nodes",
     "lattice_block",
     "liver_lobe",
+    "mesh_from_arrays",
     "pieces_of",
     "read_mesh",
     "spring_error",

@@ -43,7 +43,7 @@ class Tissue(BodyView):
         solver: How the body is cut and moved.
 
     Raises:
-        MeshError: the mesh is broken or needs repair (`tissue.mesh.validation.checked`).
+        MeshError: the mesh is broken or needs repair (`tissue.mesh_from_arrays`).
         ValueError: another argument does not fit the mesh, or is not finite.
     """
 

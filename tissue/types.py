@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.tetrahedral_mesh import TetrahedralMesh as TetrahedralMesh
 from tissue.core.three_vectors import Wrench
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and only `Surface.to_trimesh` needs it
@@ -243,15 +244,6 @@ class StepResult(NamedTuple):
         """The numbers of `energies`, and their residual [J]; None without an audit."""
         energies = self.energies
         return None if energies is None else np.array((*energies, energies.residual))
-
-
-class TetrahedralMesh(NamedTuple):
-    """A tetrahedral mesh, from a file or a generator."""
-
-    positions: FloatArray
-    """Positions of the nodes [m], shape (n_nodes, 3)."""
-    tetrahedra: IntArray
-    """Node indices, shape (n_tets, 4); signed volumes are positive."""
 
 
 class Snapshot(NamedTuple):

@@ -14,12 +14,12 @@ def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
 
 def volumes(mesh: TetrahedralMesh) -> FloatArray:
     """Return the volume of each tetrahedron at rest [m3]."""
-    return np.linalg.det(edges(*mesh)) / 6.0
+    return np.linalg.det(edges(mesh.positions, mesh.tetrahedra)) / 6.0
 
 
 def gradients(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
     """Return the deformation gradient F of each tetrahedron, shape (n_tets, 3, 3)."""
-    return edges(positions, mesh.tetrahedra) @ np.linalg.inv(edges(*mesh))
+    return edges(positions, mesh.tetrahedra) @ np.linalg.inv(edges(mesh.positions, mesh.tetrahedra))
 
 
 def around_nodes(mesh: TetrahedralMesh, values: FloatArray) -> FloatArray:
@@ -154,7 +154,11 @@ def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -
 def forces(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
     """Return the force on each node: minus V P grad N, summed over the tetrahedra around it [N]."""
     v, p = volumes(mesh), stresses(mesh, positions, law)
-    pulls = -v[:, None, None] * p @ np.linalg.inv(edges(*mesh)).transpose(0, 2, 1)
+    pulls = (
+        -v[:, None, None]
+        * p
+        @ np.linalg.inv(edges(mesh.positions, mesh.tetrahedra)).transpose(0, 2, 1)
+    )
     out = np.zeros_like(positions)
     for k in range(3):
         np.add.at(out, mesh.tetrahedra[:, k + 1], pulls[:, :, k])
@@ -193,7 +197,7 @@ def viscous_forces(
 
     Minus V T cof F grad N with T = 2 mu J d + lam tr(J d) 1, J d = sym(F' (cof F)^T).
     """
-    v, inverse = volumes(mesh), np.linalg.inv(edges(*mesh))
+    v, inverse = volumes(mesh), np.linalg.inv(edges(mesh.positions, mesh.tetrahedra))
     share = 2.0 / (1.0 + largest_growth(mesh, positions))
     c = share[:, None, None] * cofactors(gradients(mesh, positions))
     rate = edges(velocities, mesh.tetrahedra) @ inverse @ c.transpose(0, 2, 1)

@@ -3,6 +3,7 @@
 In the order in which they are best read:
 
     array_types      types of arrays, by their contents
+    tetrahedral_mesh positions, tetrahedra, and their labels
     limits           bounds of requests to a tissue
     jit              the decorator that compiles kernels
     kernel_parts     kernels compiled once, as parts of others

@@ -3,24 +3,25 @@
 import math
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from tissue.core.array_types import IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import shown
 from tissue.io.gmsh import read_gmsh
 from tissue.io.vtk_legacy import read_vtk
 from tissue.io.vtu import read_vtu
 from tissue.io.vtu_writer import write_vtu
-from tissue.mesh.mesh_arrays import MeshError
+from tissue.mesh.mesh_arrays import MeshError, mesh_arrays
 from tissue.mesh.validation import checked
 from tissue.types import TetrahedralMesh
 
-__all__ = ["READERS", "MeshError", "read_mesh", "write_vtu"]
+__all__ = ["READERS", "MeshError", "mesh_from_arrays", "read_mesh", "write_vtu"]
 
 READERS: dict[str, Callable[[bytes], TetrahedralMesh]] = {
     ".msh": read_gmsh,
@@ -59,18 +60,53 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMe
             repaired.
         ValueError: The scale is not a positive number.
     """
-    if not math.isfinite(scale) or scale <= 0.0:
-        raise ValueError(f"scale is {scale}; it must be finite and positive, 0.001 for millimetres")
+    _expect_scale(scale)
     reader = _reader(Path(path))
     data = _contents(Path(path))
     try:
         mesh = reader(data)
     except MeshError as error:
         raise MeshError(f"{path}: {_other_content(data) or error}") from None
-    mesh = checked(TetrahedralMesh(mesh.positions * scale, mesh.tetrahedra), str(path)).mesh
+    mesh = checked(mesh._replace(positions=mesh.positions * scale), str(path)).mesh
     if len(mesh.tetrahedra) < RENUMBER_FROM:
         return mesh
     return renumbered(mesh)[0]
+
+
+def mesh_from_arrays(
+    positions: FloatArray,
+    tetrahedra: IntArray,
+    labels: IntArray | None = None,
+    *,
+    label_names: Mapping[int, str] = MappingProxyType({}),
+    scale: float = 1.0,
+) -> TetrahedralMesh:
+    """Return the mesh of arrays, checked and repaired as `read_mesh` does with that of a file.
+
+    Gmsh, TetWild, PyVista and meshio give such arrays in Python. Nodes that no tetrahedron uses
+    are dropped, and nodes are split where tetrahedra meet that share no face; tetrahedra stay in
+    their order. Repairs are warnings of the logger "tissue".
+
+    Args:
+        positions: Positions of the nodes in units of `scale`, shape (n_nodes, 3).
+        tetrahedra: Node indices from 0 on, shape (n_tets, 4); they may wind either way.
+        labels: Label of each tetrahedron, a whole number from 0 on, shape (n_tets,).
+        label_names: Names of labels.
+        scale: What the unit of length is in metres: 0.001 for millimetres.
+
+    Raises:
+        MeshError: the mesh is broken; see `tissue.mesh.validation.checked`.
+        ValueError: the scale is not a positive number.
+    """
+    _expect_scale(scale)
+    mesh = mesh_arrays(TetrahedralMesh(positions, tetrahedra, labels, label_names))
+    return checked(mesh._replace(positions=mesh.positions * scale)).mesh
+
+
+def _expect_scale(scale: float) -> None:
+    """Refuse a scale that is no positive number."""
+    if not math.isfinite(scale) or scale <= 0.0:
+        raise ValueError(f"scale is {scale}; it must be finite and positive, 0.001 for millimetres")
 
 
 def _reader(path: Path) -> Callable[[bytes], TetrahedralMesh]:
@@ -135,5 +171,9 @@ def renumbered(mesh: TetrahedralMesh) -> tuple[TetrahedralMesh, IntArray]:
     place = np.empty(n, dtype=np.int64)
     place[order] = np.arange(n)
     tetrahedra = place[mesh.tetrahedra]
-    tetrahedra = tetrahedra[np.argsort(tetrahedra.min(axis=1), kind="stable")]
-    return TetrahedralMesh(mesh.positions[order], tetrahedra), place
+    by_lowest = np.argsort(tetrahedra.min(axis=1), kind="stable")
+    labels = None if mesh.labels is None else mesh.labels[by_lowest]
+    moved = mesh._replace(
+        positions=mesh.positions[order], tetrahedra=tetrahedra[by_lowest], labels=labels
+    )
+    return moved, place

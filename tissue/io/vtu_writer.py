@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from tissue.core.array_types import IntArray
 from tissue.io.whole_file import whole_file
 from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.mesh.pieces import piece_of_tetrahedra
@@ -21,7 +22,10 @@ _TYPE_NAMES = {"f4": "Float32", "f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
 def write_vtu(
-    path: str | os.PathLike[str], snapshot: Snapshot, deformation: Deformation | None = None
+    path: str | os.PathLike[str],
+    snapshot: Snapshot,
+    deformation: Deformation | None = None,
+    labels: IntArray | None = None,
 ) -> None:
     """Write `snapshot` to `path`.
 
@@ -35,13 +39,16 @@ def write_vtu(
         snapshot: The body.
         deformation: Its stress and strain, which are cell data then, in single precision: `stress`
             [Pa] and `strain`, nine components row by row, and `von_mises` [Pa]. None: none is.
+        labels: The label of each tetrahedron, shape (n_tets,), which is the cell data `label` then,
+            as `read_mesh` takes it. None: there is none.
 
     Raises:
-        MeshError: Positions or tetrahedra have another shape or hold no numbers.
+        MeshError: Positions or tetrahedra have another shape or hold no numbers; labels are no
+            whole numbers from 0 on, one for each tetrahedron.
         ValueError: Stress and strain are of other tetrahedra.
         OSError: The file cannot be written.
     """
-    mesh = mesh_arrays(TetrahedralMesh(snapshot.positions, snapshot.tetrahedra))
+    mesh = mesh_arrays(TetrahedralMesh(snapshot.positions, snapshot.tetrahedra, labels))
     snapshot = snapshot._replace(positions=mesh.positions, tetrahedra=mesh.tetrahedra)
     n_given = len(mesh.tetrahedra) if deformation is None else len(deformation.stress)
     if n_given != len(mesh.tetrahedra):
@@ -49,11 +56,13 @@ def write_vtu(
             f"the stress is that of {n_given} tetrahedra, and the body has {len(mesh.tetrahedra)}"
         )
     with whole_file(path) as unfinished, unfinished.open("wb") as file:
-        for line in _lines(snapshot, deformation):
+        for line in _lines(snapshot, deformation, mesh.labels):
             file.write(line.encode("ascii") + b"\n")
 
 
-def _lines(snapshot: Snapshot, deformation: Deformation | None) -> Iterator[str]:
+def _lines(
+    snapshot: Snapshot, deformation: Deformation | None, labels: IntArray | None
+) -> Iterator[str]:
     """Yield the lines of the file."""
     n_tets = len(snapshot.tetrahedra)
     byte_order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
@@ -80,6 +89,8 @@ def _lines(snapshot: Snapshot, deformation: Deformation | None) -> Iterator[str]
     yield "</PointData>"
     yield "<CellData>"
     yield from _data_array("piece", piece_of_tetrahedra(snapshot), "i8")
+    if labels is not None:
+        yield from _data_array("label", labels, "i8")
     if deformation is not None:
         yield from _data_array("stress", deformation.stress.reshape(-1, 9), "f4")
         yield from _data_array("strain", deformation.strain.reshape(-1, 9), "f4")

@@ -35,10 +35,6 @@ is 200 times as wide as high still has 4e-3.
 SLIVER_QUALITY = 1e-2
 """Quality below which a tetrahedron forces short time steps and poor cuts."""
 
-MOST_ODD = 0.05
-"""Share of tetrahedra that may have another orientation than the rest, as where parts of several
-sources were joined. Of more, it is unclear which are right."""
-
 N_NAMED = 5
 """Elements that an error names at most."""
 
@@ -57,14 +53,15 @@ class CheckedMesh(NamedTuple):
 def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     """Refuse a broken mesh, repair harmless faults, and warn of doubtful ones.
 
-    Repaired, with a warning: unused nodes (dropped), inverted tetrahedra where they are all or at
-    most `MOST_ODD` of them (reordered), and nodes or edges at which tetrahedra meet that share no
-    face there (the node is split).
+    Repaired, with a warning: unused nodes (dropped), inverted tetrahedra (reordered), and nodes or
+    edges at which tetrahedra meet that share no face there (the node is split). Tetrahedra stay
+    in their order, with their labels.
     Doubtful, with a warning: several pieces, slivers, a body over a metre. Warnings go to the
     logger "tissue" too.
 
-    A mesh in which tetrahedra are inverted because the body is folded over itself is refused: there
-    tetrahedra lie on the same side of the face between them.
+    Which way the nodes of a tetrahedron wind is a matter of the mesher. A mesh in which tetrahedra
+    are inverted because the body is folded over itself is refused: there tetrahedra lie on the same
+    side of the face between them.
 
     Args:
         mesh: The mesh as it comes; other integer and floating point types are converted.
@@ -73,8 +70,8 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     Raises:
         MeshError: No tetrahedra; an index out of range; NaN or infinity; a body larger than
             `MAX_EXTENT` or smaller than `MIN_EXTENT`; a tetrahedron that names a node twice,
-            occurs twice, or is flat; more than `MOST_ODD` inverted while others are not; a face
-            with three tetrahedra, or with two on the same side.
+            occurs twice, or is flat; a face with three tetrahedra, or with two on the same side;
+            labels that are no whole numbers from 0 on.
     """
     try:
         result = _checked(mesh)
@@ -104,8 +101,8 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> TetrahedralMesh:
     )
     if not is_same:
         raise MeshError(
-            f"{name}: it would have to be repaired ({'; '.join(result.warnings)}): pass it through "
-            "tissue.mesh.validation.checked first"
+            f"{name}: it would have to be repaired ({'; '.join(result.warnings)}): make it by "
+            "tissue.mesh_from_arrays(positions, tetrahedra), which does so"
         )
     return mesh
 
@@ -113,7 +110,7 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> TetrahedralMesh:
 def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
     """Return what `checked` returns: one check after another, each relying on those before."""
     warnings: list[str] = []
-    positions, tetrahedra = mesh_arrays(mesh)
+    positions, tetrahedra, labels, names = mesh_arrays(mesh)
     _refuse_wrong_indices(tetrahedra, len(positions))
     _refuse_not_finite(positions)
     positions, tetrahedra, origin = _without_unused(positions, tetrahedra, warnings)
@@ -128,7 +125,8 @@ def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
     pairs = faces.halves[faces.starts[faces.counts == 2][:, None] + [0, 1]]
     tetrahedra, copied = _with_stars_joined(tetrahedra, pairs, len(positions), warnings)
     _count_pieces(len(tetrahedra), pairs // 4, warnings)
-    sound = TetrahedralMesh(np.concatenate([positions, positions[copied]]), tetrahedra)
+    positions = np.concatenate([positions, positions[copied]])
+    sound = TetrahedralMesh(positions, tetrahedra, labels, names)
     return CheckedMesh(sound, np.concatenate([origin, origin[copied]]), tuple(warnings))
 
 
@@ -248,7 +246,7 @@ def _refuse_flat(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
 
 
 def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> IntArray:
-    """Return the tetrahedra with positive volumes, if nearly all have the same orientation.
+    """Return the tetrahedra with positive volumes.
 
     Where the body is folded over itself, a tetrahedron that is turned overlaps its neighbours, and
     that is refused afterwards.
@@ -256,19 +254,12 @@ def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
     inverted = signed_volumes(positions, tetrahedra) < 0.0
     if not inverted.any():
         return tetrahedra
-    # Where most are inverted, the few others are named: they are the fault.
-    most = inverted.mean() > 0.5
+    most = bool(inverted.mean() > 0.5)
     odd = np.flatnonzero(inverted != most)
-    kind = "not inverted while the others are" if most else "inverted"
-    named = f"{kind} tetrahedra: {_ids(odd)} ({len(odd)} of {len(tetrahedra)})"
-    if len(odd) > MOST_ODD * len(tetrahedra):
-        raise MeshError(
-            f"{named}. The body is folded over itself there, or their nodes are in the wrong order"
-        )
+    others = ("all but " if most else "") + _ids(odd) if odd.size else "all"
     warnings.append(
-        f"{named}: reordered nodes"
-        if odd.size
-        else f"all {len(tetrahedra)} tetrahedra were inverted (negative volumes): reordered nodes"
+        f"inverted tetrahedra (negative volumes): {others} ({int(inverted.sum())} of "
+        f"{len(tetrahedra)}); reordered their nodes"
     )
     return np.where(inverted[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
 
@@ -290,7 +281,8 @@ def _refuse_wrong_faces(tetrahedra: IntArray, faces: SortedFaces) -> None:
         a, b = first[overlapping[0]], second[overlapping[0]]
         raise MeshError(
             f"tetrahedra {a // 4} and {b // 4} overlap: both lie on the same side of their common "
-            f"face {_face(tetrahedra, a)}. {_count(overlapping.size, 'such pair')}"
+            f"face {_face(tetrahedra, a)}. {_count(overlapping.size, 'such pair')}. The body is "
+            "folded over itself there, or a node is in the wrong place"
         )
 
 

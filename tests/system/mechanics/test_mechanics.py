@@ -167,7 +167,7 @@ def test_25_a_block_recovers_from_random_node_positions(mesh, frame, relaxation)
         tissue.step(None, frame)
     after = tissue.snapshot()
     volumes = signed_volumes(after.positions, after.tetrahedra)
-    np.testing.assert_allclose(volumes, signed_volumes(*mesh), rtol=0.05)
+    np.testing.assert_allclose(volumes, signed_volumes(*mesh[:2]), rtol=0.05)
 
 
 # Acceptance test 26.
@@ -271,4 +271,4 @@ def volumes_in_a_press(mesh, material, height):
     )
     tissue.settle()
     after = tissue.snapshot()
-    return signed_volumes(after.positions, after.tetrahedra) / signed_volumes(*mesh)
+    return signed_volumes(after.positions, after.tetrahedra) / signed_volumes(*mesh[:2])

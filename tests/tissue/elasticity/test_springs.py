@@ -67,7 +67,7 @@ def test_the_mass_of_a_node_is_a_quarter_of_the_tetrahedra_around_it(mesh):
     springs_of(body)
     expected = naive.masses(mesh.positions, mesh.tetrahedra, DENSITY)
     np.testing.assert_allclose(body.masses, expected, rtol=1e-12)
-    assert body.masses.sum() == pytest.approx(DENSITY * signed_volumes(*mesh).sum(), rel=1e-14)
+    assert body.masses.sum() == pytest.approx(DENSITY * signed_volumes(*mesh[:2]).sum(), rel=1e-14)
 
 
 @pytest.mark.parametrize("retardation_time", [0.0, 2e-3])

@@ -73,7 +73,7 @@ class Relaxation:
         mean = naive_solid.averaged_gradients(mesh, positions) @ self.of_nodes.sum(axis=0)
         whole = whole - mean[mesh.tetrahedra].mean(axis=1)
         whole = whole - self.pressure.sum(axis=0)[:, None, None] * cofactors
-        normals = np.linalg.inv(naive_solid.edges(*mesh))  # rows: gradients of N1, N2, N3
+        normals = np.linalg.inv(naive_solid.edges(*mesh[:2]))  # rows: gradients of N1, N2, N3
         of_corners = -naive_solid.volumes(mesh)[:, None, None] * (
             whole @ normals.transpose(0, 2, 1)
         )

@@ -396,6 +396,14 @@ def test_renumbering_does_not_change_the_geometry():
     assert corners(other) == corners(mesh)
 
 
+def test_labels_follow_their_tetrahedra_as_these_are_renumbered():
+    mesh = shuffled(bodies.jittered(4, 0))
+    by_place = mesh._replace(labels=np.arange(len(mesh.tetrahedra)), label_names={3: "vessel"})
+    other, place = renumbered(by_place)
+    np.testing.assert_array_equal(place[mesh.tetrahedra[other.labels]], other.tetrahedra)
+    assert other.label_names == {3: "vessel"}
+
+
 def test_numbers_of_neighbours_are_about_as_close_as_in_a_grid():
     mesh = bodies.jittered(6, 0)
     assert spread(renumbered(shuffled(mesh))[0]) < 1.3 * spread(mesh) < 0.4 * spread(shuffled(mesh))

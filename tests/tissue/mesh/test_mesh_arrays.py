@@ -1,5 +1,10 @@
 """Meshes come as arrays of any type of numbers, and are taken or refused in one sentence."""
 
+import copy
+import logging
+import pickle
+
+import meshio
 import numpy as np
 import pytest
 
@@ -12,6 +17,7 @@ from tissue import (
     boundary_faces,
     calibrated,
     fixed_nodes,
+    mesh_from_arrays,
     pieces_of,
     read_mesh,
     write_vtu,
@@ -82,3 +88,43 @@ def test_tetrahedra_that_are_no_whole_numbers_are_refused_in_one_sentence(name, 
     wrong = TetrahedralMesh(mesh.positions, mesh.tetrahedra.astype(kind))
     with pytest.raises(MeshError, match="must be whole numbers of shape"):
         CONSUMERS[name](wrong, tmp_path)
+
+
+def test_arrays_in_millimetres_that_wind_either_way_make_a_body(caplog):
+    mesh = a_mesh()
+    wound = np.where(np.arange(48)[:, None] % 2, mesh.tetrahedra[:, [1, 0, 2, 3]], mesh.tetrahedra)
+    in_millimetres = np.concatenate([1e3 * mesh.positions, [[0.0, 0.0, 0.0]]]).astype("f4")
+    labels = np.arange(48, dtype="u1") // 24
+    with pytest.raises(MeshError, match=r"make it by tissue\.mesh_from_arrays"):
+        Tissue(TetrahedralMesh(mesh.positions, wound))
+    with caplog.at_level(logging.WARNING, logger="tissue"):
+        made = mesh_from_arrays(in_millimetres, wound, labels, label_names={1: "fat"}, scale=1e-3)
+    assert [each.split(":")[1][:10] for each in caplog.messages] == [" dropped 1", " inverted "]
+    np.testing.assert_allclose(made.positions, mesh.positions, rtol=1e-6)
+    np.testing.assert_array_equal(made.labels, labels)
+    assert made.label_names == {1: "fat"}
+    assert Tissue(made).snapshot().tetrahedra.shape == (48, 4)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, np.nan])
+def test_arrays_with_a_scale_that_is_not_positive_are_refused(scale):
+    with pytest.raises(ValueError, match="scale is"):
+        mesh_from_arrays(*a_mesh()[:2], scale=scale)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda mesh: pickle.loads(pickle.dumps(mesh))])
+def test_a_mesh_with_labels_is_copied_and_pickled(copied):
+    mesh = mesh_from_arrays(*a_mesh()[:2], np.arange(48), label_names={2: "vessel"})
+    other = copied(mesh)
+    assert other.label_names == {2: "vessel"}
+    for mine, theirs in zip(mesh[:3], other[:3], strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+def test_labels_are_written_as_cell_data_that_meshio_reads(tmp_path):
+    labels = np.arange(48) % 5
+    write_vtu(tmp_path / "body.vtu", snapshot_of(a_mesh()), labels=labels)
+    (read,) = meshio.read(tmp_path / "body.vtu").cell_data["label"]
+    np.testing.assert_array_equal(read, labels)
+    with pytest.raises(MeshError, match="one for each of the 48"):
+        write_vtu(tmp_path / "body.vtu", snapshot_of(a_mesh()), labels=labels[1:])

@@ -11,8 +11,8 @@ CORNERS = 0.01 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
 def sound_block():
-    positions, tetrahedra = block((2, 2, 2), (0.02, 0.02, 0.02))
-    return positions.copy(), tetrahedra.copy()
+    mesh = block((2, 2, 2), (0.02, 0.02, 0.02))
+    return mesh.positions.copy(), mesh.tetrahedra.copy()
 
 
 def expect_refusal(positions, tetrahedra, message):
@@ -57,13 +57,6 @@ def with_more(corners, nodes):
     return np.concatenate([positions, nodes]), np.concatenate([tetrahedra, [corners]])
 
 
-def with_inverted(n):
-    """Return the sound block with its first tetrahedra inverted."""
-    positions, tetrahedra = sound_block()
-    tetrahedra[:n] = tetrahedra[:n, [1, 0, 2, 3]]
-    return positions, tetrahedra
-
-
 SOUND, FOURTH = sound_block(), sound_block()[1][3]
 FLAT = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
 ABOVE, BELOW = [0.002, 0.002, 0.02], [0.002, 0.002, -0.02]
@@ -82,7 +75,6 @@ REFUSED = [  # positions, tetrahedra, and the message
     ),
     (*with_more([27, 28, 29, 30], FLAT), "1 flat tetrahedra, the worst: 48 "),
     (*with_node(SOUND[1][0, 1], SOUND[0][SOUND[1][0, 0]]), "flat tetrahedra, the worst: 0 "),
-    (*with_inverted(3), r"inverted tetrahedra: 0, 1, 2 \(3 of 48\)"),
     (
         np.concatenate([CORNERS, [ABOVE, BELOW]]),
         np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 2, 1, 5]]),
@@ -107,39 +99,33 @@ def test_a_broken_mesh_is_refused_by_what_is_wrong_with_it(positions, tetrahedra
     expect_refusal(positions, tetrahedra, message)
 
 
-@pytest.mark.parametrize("odd", [[4], [4, 17]])
-def test_up_to_a_twentieth_of_inverted_tetrahedra_are_reoriented_with_a_warning(odd):
+@pytest.mark.parametrize("name", ["4", "4, 17", "0, 2, 4, 6, 8, ...", "all but 4", "all"])
+def test_tetrahedra_of_a_sound_body_are_reordered_whichever_way_they_wind(name):
     positions, tetrahedra = sound_block()
-    tetrahedra[odd] = tetrahedra[odd][:, [1, 0, 2, 3]]
+    all_48 = np.arange(48)
+    inverted = {
+        "4": all_48 == 4,
+        "4, 17": np.isin(all_48, (4, 17)),
+        "0, 2, 4, 6, 8, ...": all_48 % 2 == 0,
+        "all but 4": all_48 != 4,
+        "all": all_48 >= 0,
+    }[name]
+    tetrahedra[inverted] = tetrahedra[inverted][:, [1, 0, 2, 3]]
     result = checked(TetrahedralMesh(positions, tetrahedra))
-    assert (signed_volumes(*result.mesh) > 0.0).all()
-    numbers = ", ".join(map(str, odd))
-    assert f"inverted tetrahedra: {numbers} ({len(odd)} of 48)" in result.warnings[0]
-
-
-def test_the_only_tetrahedron_that_is_not_inverted_is_named():
-    positions, tetrahedra = sound_block()
-    tetrahedra[:4] = tetrahedra[:4, [1, 0, 2, 3]]
-    tetrahedra[5:] = tetrahedra[5:, [1, 0, 2, 3]]
-    result = checked(TetrahedralMesh(positions, tetrahedra))
-    assert (signed_volumes(*result.mesh) > 0.0).all()
-    assert "not inverted while the others are tetrahedra: 4 " in result.warnings[0]
+    assert (signed_volumes(*result.mesh[:2]) > 0.0).all()
+    assert result.warnings == (
+        f"inverted tetrahedra (negative volumes): {name} ({inverted.sum()} of 48); reordered "
+        "their nodes",
+    )
 
 
 def test_a_tetrahedron_that_is_folded_over_its_neighbours_is_refused():
-    positions, tetrahedra = block((4, 4, 4), (0.04, 0.04, 0.04))
+    positions, tetrahedra = block((4, 4, 4), (0.04, 0.04, 0.04))[:2]
     positions = positions.copy()
     middle = np.flatnonzero((positions == 0.02).all(axis=1))[0]
     positions[middle, 0] += 0.011  # past the face of the cell beside
     assert 0.0 < (signed_volumes(positions, tetrahedra) < 0.0).mean() < 0.05
     expect_refusal(positions, tetrahedra, "overlap: both lie on the same side")
-
-
-def test_a_mesh_of_inverted_tetrahedra_is_reoriented_with_a_warning():
-    positions, tetrahedra = sound_block()
-    result = checked(TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]))
-    assert (signed_volumes(*result.mesh) > 0.0).all()
-    assert "all 48 tetrahedra were inverted" in result.warnings[0]
 
 
 def test_a_body_of_twenty_metres_gets_a_hint_at_the_scale():
@@ -180,6 +166,33 @@ def test_tetrahedra_connected_only_by_a_node_or_an_edge_are_separated(other, n_s
     assert "in 2 pieces" in result.warnings[1]
 
 
+def test_labels_stay_with_their_tetrahedra_through_repairs():
+    positions, tetrahedra = sound_block()
+    labels, names = np.arange(48) % 3, {1: "vessel"}
+    turned = np.where((labels == 2)[:, None], tetrahedra[:, [1, 0, 2, 3]], tetrahedra)
+    given = TetrahedralMesh(np.concatenate([CORNERS, positions]), turned + 4, labels, names)
+    mesh = checked(given).mesh
+    assert np.array_equal(np.sort(mesh.tetrahedra), np.sort(tetrahedra))
+    assert np.array_equal(mesh.labels, labels)
+    assert mesh.label_names == names
+
+
+@pytest.mark.parametrize(
+    ("labels", "names", "message"),
+    [
+        (np.zeros(47, dtype=int), {}, "one for each of the 48 tetrahedra"),
+        (np.zeros(48), {}, "labels are float64"),
+        (np.arange(48) - 1, {}, "tetrahedron 0 has the label -1"),
+        (np.arange(48) + 2**31, {}, "tetrahedron 0 has the label 2147483648"),
+        (np.arange(48), {-1: "vessel"}, "label_names has 'vessel' for -1"),
+        (np.arange(48), {1: 2}, "label_names has 2 for 1"),
+    ],
+)
+def test_labels_that_are_none_are_refused(labels, names, message):
+    with pytest.raises(MeshError, match=message):
+        checked(TetrahedralMesh(*sound_block(), labels, names))
+
+
 def test_slivers_are_allowed_with_a_warning():
     positions, tetrahedra = sound_block()
     (warning,) = checked(TetrahedralMesh(positions * [1, 1, 1e-3], tetrahedra)).warnings
@@ -209,7 +222,8 @@ def test_components_are_numbered_by_their_lowest_vertices():
 
 def test_a_mesh_that_needs_repair_is_refused_where_it_must_not_change():
     positions, tetrahedra = sound_block()
-    expect_sound(TetrahedralMesh(positions, tetrahedra))
+    labels = np.arange(48)
+    assert expect_sound(TetrahedralMesh(positions, tetrahedra, labels)).labels is labels
     expect_sound(TetrahedralMesh(1000.0 * positions, tetrahedra))  # implausible, but not wrong
     for broken in (
         TetrahedralMesh(np.concatenate([positions, CORNERS]), tetrahedra),

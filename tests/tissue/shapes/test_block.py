@@ -20,7 +20,7 @@ def test_the_default_grid_is_the_block_of_figure_10():
 
 @pytest.mark.parametrize("cells", [(1, 1, 1), (1, 2, 5), (4, 6, 4)])
 def test_the_six_tetrahedra_of_a_cell_have_equal_positive_volumes(cells):
-    volumes = signed_volumes(*block(cells, (0.1, 0.2, 0.3)))
+    volumes = signed_volumes(*block(cells, (0.1, 0.2, 0.3))[:2])
     assert volumes == pytest.approx(0.1 * 0.2 * 0.3 / (6 * np.prod(cells)), rel=1e-12)
 
 
@@ -65,7 +65,7 @@ def test_the_organ_has_the_size_of_a_liver_lobe_and_is_at_the_origin():
 def test_an_organ_of_a_finer_spacing_has_the_same_shape():
     mesh, finer = liver_lobe(), liver_lobe(0.75)
     assert 2.0 < len(finer.tetrahedra) / len(mesh.tetrahedra) < 2.6
-    volumes = [signed_volumes(*each).sum() for each in (mesh, finer)]
+    volumes = [signed_volumes(*each[:2]).sum() for each in (mesh, finer)]
     assert volumes[1] == pytest.approx(volumes[0], rel=0.01)
 
 
@@ -93,8 +93,8 @@ def test_a_lattice_block_fills_its_box_with_sound_tetrahedra(cells):
     size = (0.1, 0.2, 0.3)
     mesh = lattice_block(cells, size)
     checked(mesh)
-    assert signed_volumes(*mesh).min() > 0.0
-    assert signed_volumes(*mesh).sum() == pytest.approx(np.prod(size), rel=1e-12)
+    assert signed_volumes(*mesh[:2]).min() > 0.0
+    assert signed_volumes(*mesh[:2]).sum() == pytest.approx(np.prod(size), rel=1e-12)
     assert np.array_equal(mesh.positions.min(axis=0), [0.0, 0.0, 0.0])
     assert np.array_equal(mesh.positions.max(axis=0), size)
 
@@ -145,7 +145,7 @@ def test_an_impossible_lattice_is_refused_with_the_reason(arguments, message):
 @pytest.mark.parametrize("cells", [(1, 1), (2, 3), (5, 8), (8, 4)])
 def test_its_volume_is_that_of_the_circle_times_the_height(cells):
     mesh = cylinder(cells, 0.015, 0.04)
-    volumes = signed_volumes(*mesh)
+    volumes = signed_volumes(*mesh[:2])
     assert volumes.min() > 0.0
     assert volumes.sum() == pytest.approx(np.pi * 0.015**2 * 0.04, rel=1e-12)
     assert len(mesh.tetrahedra) == 3 * 6 * cells[0] ** 2 * cells[1]
@@ -162,7 +162,7 @@ def test_neighbours_in_a_cylinder_agree_on_every_face(cells):
 
 def test_its_elements_have_no_bad_shape():
     mesh = cylinder((5, 17), 0.015, 0.05)
-    assert quality(*mesh).min() > 0.3
+    assert quality(*mesh[:2]).min() > 0.3
 
 
 def test_the_ends_are_flat_and_the_side_is_on_a_circle():
