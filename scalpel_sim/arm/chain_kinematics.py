@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from scalpel_sim.arm.arm import DrivenArm
+from scalpel_sim.arm.overlaps import Overlap, overlaps
 from scalpel_sim.errors import UsageError
 from tissue import BladeSegment, BoolArray, FloatArray
 
@@ -72,11 +73,18 @@ class Followed(NamedTuple):
     """Displacement and turn that the edge lacks there."""
     number: int
     """Number of that pose."""
+    overlaps: Sequence[Overlap] = ()
+    """What overlaps at the first pose at which anything of the arm does, deepest first."""
 
     @property
     def is_whole(self) -> bool:
         """Whether the arm reaches all poses."""
         return self.miss.size <= 1.0
+
+    @property
+    def depth(self) -> float:
+        """Depth of what overlaps [m]."""
+        return self.overlaps[0].depth if self.overlaps else 0.0
 
 
 class ChainKinematics:
@@ -128,14 +136,29 @@ class ChainKinematics:
         assert farthest is not None
         return farthest
 
+    def find_clear(self, poses: Sequence[BladeSegment]) -> Followed:
+        """Follow poses as `find` does, clear of itself where that is possible.
+
+        Where it is not, the way with the shallowest overlap is returned.
+        """
+        shallowest: Followed | None = None
+        for start in self.starts():
+            found = self.follow(start, poses)
+            if found.is_whole and (shallowest is None or found.depth < shallowest.depth):
+                shallowest = found
+            if shallowest is not None and not shallowest.overlaps:
+                return shallowest
+        return shallowest or self.find(poses)
+
     def follow(self, qpos: FloatArray, poses: Sequence[BladeSegment]) -> Followed:
         """Follow poses from a configuration, up to the first that is not reached."""
         qpos, miss = self.solve(qpos, poses[0])
-        first, n = qpos, 1
+        first, n, met = qpos, 1, overlaps(self._model, self._data)
         while miss.size <= 1.0 and n < len(poses):
             qpos, miss = self.solve(qpos, poses[n])
             n += 1
-        return Followed(first, qpos, miss, n - 1)
+            met = met or overlaps(self._model, self._data)
+        return Followed(first, qpos, miss, n - 1, met)
 
     def solve(self, qpos: FloatArray, pose: BladeSegment) -> tuple[FloatArray, Miss]:
         """Return a configuration near `qpos` that has the edge at a pose, and what it lacks."""

@@ -12,6 +12,7 @@ from typing import Final
 from urllib.parse import unquote
 
 import mujoco
+import numpy as np
 
 _READ: Final = (".obj", ".stl", ".msh")
 """Endings of files of meshes that MuJoCo reads."""
@@ -20,8 +21,11 @@ _KEPT: Final = {"fusestatic": "false", "discardvisual": "false", "strippath": "f
 """Options of MuJoCo's compiler with which links, their visible shapes and paths stay, unless the
 file says otherwise."""
 
+_MOMENTS: Final = ("xx", "yy", "zz", "xy", "xz", "yz")
+"""Entries of an inertia in a URDF file, after an i."""
+
 _NAMED: Final = 3
-"""Meshes that a warning names."""
+"""Meshes, or links, that a warning names."""
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -56,17 +60,49 @@ def spec_of_file(path: Path) -> mujoco.MjSpec:
             "it is a xacro file, which programs of ROS expand: xacro FILE > robot.urdf. Give that"
         )
     _prefer_collision(robot)
-    _leave_out(robot, _take_meshes(robot, path.resolve().parent))
-    options = robot.find("mujoco/compiler")
-    if options is None:
-        own = robot.find("mujoco")
-        options = ET.SubElement(ET.SubElement(robot, "mujoco") if own is None else own, "compiler")
+    options = _options(robot)
+    folder = path.resolve().parent
+    _leave_out(robot, _take_meshes(robot, folder, folder / options.get("meshdir", "")))
     for key, value in _KEPT.items():
         options.attrib.setdefault(key, value)
+    _balance(robot, options)
     spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
     spec.modelfiledir = str(path.resolve().parent)
     _expect_masses(spec, robot)
     return spec
+
+
+def _options(robot: ET.Element) -> ET.Element:
+    """Return the options of MuJoCo's compiler in a robot, which has none yet where they are new."""
+    options = robot.find("mujoco/compiler")
+    if options is None:
+        own = robot.find("mujoco")
+        options = ET.SubElement(ET.SubElement(robot, "mujoco") if own is None else own, "compiler")
+    return options
+
+
+def _balance(robot: ET.Element, options: ET.Element) -> None:
+    """Have inertias that no solid can have replaced, and say whose.
+
+    Each principal moment is at most the sum of the others. MuJoCo takes their mean instead.
+    """
+    wrong = []
+    for link in robot.iter("link"):
+        given = link.find("inertial/inertia")
+        if given is None:
+            continue
+        xx, yy, zz, xy, xz, yz = (float(given.get(f"i{key}", 0.0)) for key in _MOMENTS)
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if moments[0] + moments[1] < moments[2]:
+            wrong.append(link.get("name", ""))
+    if wrong and "balanceinertia" not in options.attrib:
+        options.set("balanceinertia", "true")
+        more = f" and {len(wrong) - _NAMED} more" if len(wrong) > _NAMED else ""
+        _warn_once(
+            f"no solid has the inertia that the robot '{robot.get('name', '')}' gives for "
+            f"{', '.join(wrong[:_NAMED])}{more}: the largest principal moment is more than the sum "
+            "of the others. The mean of the three is taken"
+        )
 
 
 def _prefer_collision(robot: ET.Element) -> None:
@@ -77,11 +113,17 @@ def _prefer_collision(robot: ET.Element) -> None:
                 link.remove(visual)
 
 
-def _take_meshes(robot: ET.Element, folder: Path) -> list[ET.Element]:
-    """Give meshes the paths of their files; return those of which there is none."""
+def _take_meshes(robot: ET.Element, folder: Path, meshes: Path) -> list[ET.Element]:
+    """Give meshes the paths of their files; return those of which there is none.
+
+    Args:
+        robot: The robot.
+        folder: Its folder.
+        meshes: Where its options say that meshes are.
+    """
     missing = []
     for mesh in robot.iter("mesh"):
-        file = _file_of(mesh.get("filename", ""), folder)
+        file = _file_of(mesh.get("filename", ""), folder, meshes)
         if file is None or file.suffix.lower() not in _READ:
             missing.append(mesh)
         else:
@@ -89,7 +131,7 @@ def _take_meshes(robot: ET.Element, folder: Path) -> list[ET.Element]:
     return missing
 
 
-def _file_of(uri: str, folder: Path) -> Path | None:
+def _file_of(uri: str, folder: Path, meshes: Path) -> Path | None:
     """Return the file of a mesh; None where there is none.
 
     A package is looked for next to the file of the robot and in all folders above, by its name;
@@ -98,13 +140,15 @@ def _file_of(uri: str, folder: Path) -> Path | None:
     Args:
         uri: What the robot calls it: `package://NAME/PATH`, `file://PATH`, or a path.
         folder: Folder of the robot.
+        meshes: Folder of meshes, where it is of that name or path; MuJoCo looks nowhere else.
     """
     scheme, _, rest = uri.rpartition("://")
     path = Path(unquote(rest) if scheme else rest)
-    tried = [folder / path]
+    tried = [folder / path, meshes / path, meshes / path.name]
     if scheme in ("package", "model"):
         inside = Path(*path.parts[1:])
-        tried = [each / part for each in (folder, *folder.parents) for part in (path, inside)]
+        above = [each / part for each in (folder, *folder.parents) for part in (path, inside)]
+        tried = [*above, meshes / path.name]
     return next((each for each in tried if each.is_file()), None)
 
 

@@ -5,6 +5,7 @@ it: it acts through the joints, whatever they are. The model's own actuators are
 would hold the joints where they are.
 """
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -18,6 +19,7 @@ from scalpel_sim.arm.chain_kinematics import ChainKinematics
 from scalpel_sim.arm.grasper import FORWARD
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.model_file import spec_of_file
+from scalpel_sim.arm.overlaps import first_configuration, in_words, pass_where_they_overlap
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.arm.reachable_box import SMALLEST_SHARE, reachable_part
 from scalpel_sim.arm.scalpel import HEEL, TIP, add_scalpel
@@ -29,6 +31,8 @@ from tissue import BladeSegment, BladeShape, FloatArray
 
 _SAMPLES: Final = 33
 """Poses along the stroke that the arm must reach."""
+
+_log = logging.getLogger("scalpel_sim")
 
 
 class Mount(NamedTuple):
@@ -77,6 +81,7 @@ def own_arm(
                 spec, mount.at, mount.blade, length=mount.length, forward=mount.forward
             )
             heel, tip, forward = prefix + HEEL, prefix + TIP, FORWARD
+        pass_where_they_overlap(spec, path.stem)
         arm = DrivenArm(
             spec,
             path.stem,
@@ -90,7 +95,7 @@ def own_arm(
         expect_angles(arm.model)
     except ValueError as error:
         raise UsageError(f"[arm] model {path}: {error}") from error
-    arm.reset(_at_first(arm))
+    arm.reset(first_configuration(arm.model)[: len(arm.ranges()[0])])
     return arm
 
 
@@ -143,13 +148,6 @@ def frame_at(pos: Sequence[float], quat: Sequence[float]) -> TissueFrame:
     return TissueFrame(axes.reshape(3, 3), np.array(pos))
 
 
-def _at_first(arm: DrivenArm) -> FloatArray:
-    """Return the configuration of the first keyframe, or that of the model without one."""
-    first = arm.model.key_qpos[0] if arm.model.nkey else arm.model.qpos0
-    low, high = arm.ranges()
-    return np.asarray(np.clip(first[: len(low)], low, high))
-
-
 def move_to_start(
     arm: DrivenArm, stroke: Stroke, frame: TissueFrame, place: PlaceInScene | None = None
 ) -> None:
@@ -167,10 +165,17 @@ def move_to_start(
     """
     times, poses = _watched(stroke, frame)
     solver = ChainKinematics(arm)
-    found = solver.find(poses)
+    found = solver.find_clear(poses)
     if not found.is_whole:
         lacks = what_it_lacks(solver, times, poses, place or place_of_tissue(frame))
         raise PlacementError(f"the arm '{arm.name}' does not reach the stroke: {lacks}")
+    if found.overlaps:
+        _log.warning(
+            "the arm '%s' cannot do the stroke clear of itself and of what stands in its model, "
+            "which bends its path: there overlap %s. Move or turn the tissue",
+            arm.name,
+            in_words(found.overlaps),
+        )
     arm.reset(found.first)
 
 
@@ -196,7 +201,7 @@ def move_within(
     """
 
     def move(tour: Stroke, shares: FloatArray) -> None:
-        found = ChainKinematics(arm).find(_watched(tour, frame)[1])
+        found = ChainKinematics(arm).find_clear(_watched(tour, frame)[1])
         if not found.is_whole:
             if shares.max() <= SMALLEST_SHARE:  # the last that is tried: say what it lacks
                 move_to_start(arm, tour, frame, place)

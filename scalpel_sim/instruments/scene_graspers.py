@@ -28,6 +28,7 @@ from scalpel_sim.arm.grasper import (
 )
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.arm.kinematics import Spheres
+from scalpel_sim.arm.overlaps import pass_where_they_overlap
 from scalpel_sim.arm.placement import (
     AUTO,
     SAMPLES,
@@ -257,7 +258,9 @@ def model_with_grasper(
 
     def with_grasper() -> tuple[mujoco.MjSpec, str]:
         spec = own_spec(path)
-        return spec, add_grasper(spec, at, force=grasper.force)
+        prefix = add_grasper(spec, at, force=grasper.force)
+        pass_where_they_overlap(spec, path.stem)
+        return spec, prefix
 
     try:
         spec, prefix = with_grasper()

@@ -2,6 +2,7 @@
 
 import logging
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -73,6 +74,23 @@ def test_meshes_that_are_not_there_or_of_another_kind_are_left_out_with_a_word(c
     assert model.nmesh == 0 and model.nv == 2
     (record,) = caplog.records
     assert "without 1 of its meshes" in record.message and "meshes/gone.stl" in record.message
+
+
+def test_meshes_are_found_in_the_folder_that_the_robot_names_for_mujoco(clone, caplog):
+    path = robot(clone, meshes=("elsewhere/arm.stl", "arm.dae"))
+    option = '<mujoco><compiler meshdir="../meshes"/></mujoco><link name="base"/>'
+    path.write_text(path.read_text().replace('<link name="base"/>', option))
+    assert spec_of_file(path).compile().nmesh == 1
+    assert not caplog.records
+
+
+def test_an_inertia_that_no_solid_has_is_balanced_with_a_word(clone, caplog):
+    path = robot(clone, upper=MASS.replace('ixx=".01"', 'ixx=".04"'))
+    model = spec_of_file(path).compile()
+    np.testing.assert_allclose(model.body("upper").inertia, 0.02)
+    np.testing.assert_allclose(model.body("lower").inertia, 0.01)
+    (record,) = caplog.records
+    assert "no solid has the inertia that the robot 'two hinges' gives for upper" in record.message
 
 
 def test_a_link_that_moves_without_mass_is_named(clone):

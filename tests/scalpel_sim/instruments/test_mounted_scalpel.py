@@ -114,9 +114,22 @@ def six_hinges():
     return spec.to_xml()
 
 
+def six_with_hulls():
+    """The same, with a pedestal and an upper arm that overlap wherever it is."""
+    spec = mujoco.MjSpec.from_string(six_hinges())
+    pedestal = spec.worldbody.add_body(name="pedestal")
+    for body, at, size in (
+        (pedestal, (0.03, 0.01, 0.1), 0.2),
+        (spec.body("upper_arm"), (-0.1, 0.0, 0.13), 0.12),
+    ):
+        body.add_geom(size=[size, 0.0, 0.0], pos=at, mass=1e-3, contype=1, conaffinity=1)
+    return spec.to_xml()
+
+
 ARMS = {
     "slides.xml": (lambda: SLIDES, (0.0, 0.0, 0.2)),
     "six_hinges.xml": (six_hinges, (-0.03, 0.4, 0.02)),
+    "six_with_hulls.xml": (six_with_hulls, (-0.03, 0.4, 0.02)),
     "seven_hinges.urdf": (seven_hinges, (0.5, 0.0, 0.1)),
     "with_jaws.xml": (lambda: WITH_JAWS, (0.4, 0.0, 0.1)),
 }
