@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from scalpel_sim.arm.free_names import free_name
+from scalpel_sim.arm.standing import TABLETOP
 from scalpel_sim.viewer import primitives
 from scalpel_sim.viewer.primitives import TriangleMesh, blade, edge_in_geom
 from tissue import FloatArray
@@ -56,6 +57,11 @@ class Shape(NamedTuple):
         return self.is_blade or self.name.endswith(PADS)
 
     @property
+    def is_table(self) -> bool:
+        """Whether the geom is the board of a scene's table."""
+        return self.body == 0 and self.name.endswith(TABLETOP)
+
+    @property
     def is_link(self) -> bool:
         """Whether the geom is another part of an arm, which may stand before the tissue."""
         return self.body > 0 and not (self.is_end or self.is_target)
@@ -96,6 +102,14 @@ def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, np.ascontiguousarray(pose[3:]))
     return pose[:3], matrix.reshape(3, 3)
+
+
+def in_world(shape: Shape, body_poses: FloatArray, points: FloatArray) -> FloatArray:
+    """Return points of a shape's own frame in the world [m], shape (n, 3)."""
+    for pose in (shape.pose, body_poses[shape.body]):
+        position, rotation = position_and_rotation(pose)
+        points = points @ rotation.T + position
+    return points
 
 
 def _colour(model: mujoco.MjModel, geom: int) -> FloatArray:

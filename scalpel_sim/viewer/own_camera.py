@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.viewer.model_shapes import Shape, position_and_rotation
+from scalpel_sim.viewer.model_shapes import Shape, in_world
 from tissue import FloatArray
 
 DISTANCE = 2.4
@@ -74,7 +74,7 @@ def working_ends(shapes: Sequence[Shape], body_poses: FloatArray) -> FloatArray:
     for shape in shapes:
         if shape.is_end:
             own = np.zeros(3) if shape.edge is None else shape.edge[1]
-            ends.append(_in_world(shape, body_poses, own[None]))
+            ends.append(in_world(shape, body_poses, own[None]))
     return np.concatenate(ends)
 
 
@@ -95,7 +95,7 @@ def hidden(
     for shape in shapes:
         if not shape.is_link:
             continue
-        corners = _in_world(shape, body_poses, shape.mesh.positions)
+        corners = in_world(shape, body_poses, shape.mesh.positions)
         middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
         radius = np.linalg.norm(corners - middle, axis=1).max()
         along = np.clip(ways @ (middle - eye) / (ways**2).sum(axis=1), 0.0, 1.0)
@@ -128,19 +128,11 @@ def _entry(shapes: Sequence[Shape], body_poses: FloatArray, frame: TissueFrame) 
     way = -frame.rotation[:, 1]
     for shape in shapes:
         if shape.edge is not None:
-            heel, tip = _in_world(shape, body_poses, np.stack(shape.edge))
-            middle_of_sheet = _in_world(shape, body_poses, np.zeros((1, 3)))[0]
+            heel, tip = in_world(shape, body_poses, np.stack(shape.edge))
+            middle_of_sheet = in_world(shape, body_poses, np.zeros((1, 3)))[0]
             back = middle_of_sheet - 0.5 * (heel + tip)
             along = (heel - tip) / np.linalg.norm(heel - tip)
             back -= (back @ along) * along  # the sheet is behind its edge
             back /= np.linalg.norm(back)
             way = back if np.hypot(*back[:2]) > LEAST_LEVEL else along
     return float(np.arctan2(way[1], way[0]))
-
-
-def _in_world(shape: Shape, body_poses: FloatArray, points: FloatArray) -> FloatArray:
-    """Return points of a shape's own frame in the world, shape (n, 3)."""
-    for pose in (shape.pose, body_poses[shape.body]):
-        position, rotation = position_and_rotation(pose)
-        points = points @ rotation.T + position
-    return points

@@ -133,11 +133,18 @@ of its length. A box that they do not fit is another part of the same body."""
 
 #      spine_start ____________ spine_end
 #                 |            \___
-#                 |                \___
+#   ground_start  |-----------------\--- ground_end
 #            heel |____________________\ tip        sharp along heel-tip, no. 11 blade
 #
 SPINE_LENGTH = 0.45
 """Length of the blunt back of a no. 11 blade up to its slope, in lengths of the edge."""
+
+GROUND_WIDTH = 0.22
+"""Width of the strips that are ground to the edge, in widths of the blade."""
+
+HOLLOW = 0.12
+"""How far normals lean away from the middle of a blade, at its ends: as if its flats were ground
+hollow. Flats that are quite flat reflect one thing, and look like card."""
 
 
 def edge_in_geom(model: mujoco.MjModel, geom: int) -> tuple[FloatArray, FloatArray] | None:
@@ -180,11 +187,16 @@ def blade(size: FloatArray, heel: FloatArray, tip: FloatArray) -> TriangleMesh:
     half *= size.min() / np.linalg.norm(half)
     spine_start = heel + width * towards_spine
     spine_end = spine_start + SPINE_LENGTH * along
-    corners = np.array(
-        [heel, tip, spine_start + half, spine_end + half, spine_start - half, spine_end - half]
-    )
-    heel_, tip_, start, end, start_, end_ = range(6)
-    front = [[heel_, tip_, end], [heel_, end, start]]
-    back = [[tip_, heel_, start_], [tip_, start_, end_]]
-    rim = [[start, end, end_], [start, end_, start_], [end, tip_, end_], [heel_, start, start_]]
-    return faceted(corners, np.array(front + back + rim))
+    middle = [heel + GROUND_WIDTH * (spine_start - heel), tip + GROUND_WIDTH * (spine_end - tip)]
+    sheet = np.stack([*middle, spine_end, spine_start])
+    corners = np.concatenate([[heel, tip], sheet + half, sheet - half])
+    front = [[0, 1, 3], [0, 3, 2], [2, 3, 4], [2, 4, 5]]
+    back = [[1, 0, 6], [1, 6, 7], [7, 6, 9], [7, 9, 8]]
+    spine, slope = [[5, 4, 8], [5, 8, 9]], [[4, 3, 7], [4, 7, 8], [3, 1, 7]]
+    end = [[0, 2, 6], [2, 5, 9], [2, 9, 6]]
+    mesh = faceted(corners, np.array(front + back + spine + slope + end))
+    share = (mesh.positions - heel) @ along / (along @ along)
+    unit = along / np.linalg.norm(along)
+    normals = mesh.normals + HOLLOW * (2.0 * share[:, None] - 1.0) * unit
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return mesh._replace(normals=normals)

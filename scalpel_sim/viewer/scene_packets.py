@@ -15,11 +15,21 @@ from scalpel_sim.viewer.model_shapes import Shape, position_and_rotation
 from scalpel_sim.viewer.own_camera import own_eye
 from scalpel_sim.viewer.primitives import TriangleMesh
 from scalpel_sim.viewer.scene3d import Appearance, Scene3D
+from scalpel_sim.viewer.stand import stand_under
 from scalpel_sim.viewer.textures import map_texture
 from tissue import FloatArray, IntArray, Surface, SurfaceQuantity
 
 TISSUE = "/tissue"
 """Path of the tissue. Objects below it are in the tissue frame, all others in the world frame."""
+
+STAND = "/stand"
+"""Path of what is drawn below the tissue."""
+
+CLOTH = "cloth"
+"""Name of the appearance of drapes, and of the tables that they cover."""
+
+CLOTH_TILE = 0.8
+"""Length of one repeat of the cloth, in diagonals of the body."""
 
 TILES_PER_BODY = 2.2
 """Repeats of the texture along the diagonal of the body."""
@@ -58,6 +68,13 @@ _STEEL = {
     "finish": "steel",
 }
 """Properties of the material of the blade."""
+
+_TRAY = {**_STEEL, "color": 0x8B949A, "finish": "brushed"}
+"""Properties of the material of the tray."""
+
+_CLOTH = {"color": 0x5A8C85, "specular": 0x0A0A0A, "shininess": 8}
+"""Properties of the material of a drape: the green of operating theatres, beside which tissue is
+red."""
 
 _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
 """Properties of the material of painted parts."""
@@ -114,8 +131,10 @@ class ScenePackets:
         self._diagonal = float(np.linalg.norm(highest - lowest))
         scene = Scene3D()
         _set_tissue_appearances(scene, self._diagonal, self._look)
+        scene.set_appearance(CLOTH, _cloth(self._diagonal))
         for shape in self._shapes:
             self._set_shape(scene, shape, centre, body_poses[shape.body])
+        self._set_stand(scene, surface, body_poses)
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
         cameras = [*map(self._camera, self._views)]
         if OWN_VIEW not in [camera.name for camera in cameras]:
@@ -152,10 +171,30 @@ class ScenePackets:
             body_position, body_rotation = position_and_rotation(body_pose)
             below = ((centre - body_position) @ body_rotation - position) @ rotation
             mesh = _plane_around(mesh, below, TABLE_RADIUS * self._diagonal)
+        if shape.is_table:
+            scene.set_mesh(path, self._on_cloth(mesh), CLOTH)
+            scene.set_pose(path, position, rotation)
+            return
         part = "end" if shape.is_end else "link" if shape.is_link else None
         scene.set_appearance(appearance, _appearance_of(shape)._replace(part=part))
         scene.set_mesh(path, mesh, appearance)
         scene.set_pose(path, position, rotation)
+
+    def _set_stand(self, scene: Scene3D, surface: Surface, body_poses: FloatArray) -> None:
+        """Put a draped stand below the body, where there is room."""
+        positions = self._frame.points_to_world(surface.positions)
+        stand = stand_under(self._shapes, body_poses, positions)
+        if stand is None:
+            return
+        scene.set_mesh(f"{STAND}/drape", self._on_cloth(stand.drape), CLOTH)
+        if stand.tray is not None:
+            scene.set_appearance("tray", Appearance("MeshPhongMaterial", _TRAY))
+            scene.set_mesh(f"{STAND}/tray", stand.tray, "tray")
+
+    def _on_cloth(self, mesh: TriangleMesh) -> TriangleMesh:
+        """Return a mesh with texture coordinates of cloth: by lengths on it, or from above."""
+        lengths = mesh.positions[:, :2] if mesh.uv is None else mesh.uv
+        return mesh._replace(uv=lengths / (CLOTH_TILE * self._diagonal))
 
     def _camera(self, view: ViewTable) -> ViewTable:
         """Return a view in the frame of the world."""
@@ -176,9 +215,16 @@ def _set_tissue_appearances(scene: Scene3D, diagonal: float, look: Look) -> None
         scene.set_appearance(name, Appearance("MeshPhongMaterial", properties, maps))
 
 
+def _cloth(diagonal: float) -> Appearance:
+    """Return the appearance of a drape, with relief in proportion to the body's diagonal [m]."""
+    picture = textures.cloth()
+    properties = {**_CLOTH, "bumpScale": 0.002 * diagonal}
+    return Appearance("MeshPhongMaterial", properties, {"map": picture, "bumpMap": picture})
+
+
 def _appearance_of(shape: Shape) -> Appearance:
-    """Return the appearance of a shape of the model: steel, table cloth, or paint."""
-    if shape.is_blade:
+    """Return the appearance of a shape of the model: steel, floor, or paint."""
+    if shape.is_end:
         return Appearance("MeshPhongMaterial", _STEEL)
     red, green, blue, opacity = (float(channel) for channel in shape.colour)
     colour = int(np.dot(np.round(255.0 * np.clip([red, green, blue], 0.0, 1.0)), [65536, 256, 1]))

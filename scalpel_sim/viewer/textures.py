@@ -34,6 +34,9 @@ triangles around a vertex, at rest, there is a crease, and its edge is drawn sha
 box, but not the rim of an organ, whose charts meet at any angle. At 45 degrees boxes would look
 inflated."""
 
+GREYS: Ramp = ((0.0, "000000"), (1.0, "ffffff"))
+"""Ramp of what is no colour."""
+
 N_CHARTS = 6
 """Number of charts: the sides of a cube."""
 
@@ -82,12 +85,26 @@ def cut_face(look: Look = ORGAN_LOOK) -> bytes:
 
 
 @functools.cache
+def cloth() -> bytes:
+    """Return the texture of a cloth as a PNG: woven, a little crumpled, with the crease of a fold.
+
+    Its mean is bright: it is a factor of the colour.
+    """
+    size = TEXTURE_PIXELS // 2
+    crumple = _standardized(_noise(seed=21, wavelength=170.0, spread=0.5)[::2, ::2])
+    across, along = np.meshgrid(np.arange(size), np.arange(size))
+    weave = np.where((across + along) % 2 == 0, 1.0, -1.0) * np.cos(np.pi * across / 2.0)
+    crease = sum(np.exp(-(((each - size / 2) / 2.5) ** 2)) for each in (across, along))
+    return _png(0.88 + 0.025 * crumple + 0.03 * weave - 0.08 * np.minimum(crease, 1.0), GREYS)
+
+
+@functools.cache
 def fading_disc() -> bytes:
     """Return the opacity of a table as a PNG that fades from white in the middle to black."""
     axis = np.linspace(-1.0, 1.0, 256)
     radius = np.hypot(axis[:, None], axis[None, :])
     fade = np.clip((1.0 - radius) / 0.75, 0.0, 1.0)
-    return _png(fade * fade * (3.0 - 2.0 * fade), ((0.0, "000000"), (1.0, "ffffff")))
+    return _png(fade * fade * (3.0 - 2.0 * fade), GREYS)
 
 
 def _noise(seed: int, wavelength: float, spread: float, stretch: float = 1.0) -> FloatArray:

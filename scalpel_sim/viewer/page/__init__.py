@@ -24,6 +24,7 @@ _OF_ALL_PAGES = (
     "materials.js",
     "force_marks.js",
     "field_colours.js",
+    "smooth.js",
     "see_through.js",
     "scene_view.js",
     "coarseness.js",

@@ -1,17 +1,17 @@
 // How coarsely a picture is drawn while it changes. Without a graphics card it is the drawing that takes
-// the time from hand to picture: shadows and blurred panels are left out first, then relief and gloss,
+// the time from hand to picture: shadows, smooth skin and blurred panels are left out first, then relief and gloss,
 // then pixels. At rest all is drawn.
 "use strict";
 
 // What each level leaves out, and what its picture costs by software, as a share of the first.
 const LEVELS = [
-    { shadows: true, plain: false, pixels: 1, cost: 1 },
-    { shadows: false, plain: false, pixels: 1, cost: 0.8 },
-    { shadows: false, plain: true, pixels: 1, cost: 0.25 },
-    { shadows: false, plain: true, pixels: 0.7, cost: 0.13 },
-    { shadows: false, plain: true, pixels: 0.5, cost: 0.07 },
-    { shadows: false, plain: true, pixels: 0.35, cost: 0.04 },
-    { shadows: false, plain: true, pixels: 0.25, cost: 0.025 },
+    { shadows: true, plain: false, pixels: 1, smooth: true, cost: 1 },
+    { shadows: false, plain: false, pixels: 1, smooth: false, cost: 0.8 },
+    { shadows: false, plain: true, pixels: 1, smooth: false, cost: 0.25 },
+    { shadows: false, plain: true, pixels: 0.7, smooth: false, cost: 0.13 },
+    { shadows: false, plain: true, pixels: 0.5, smooth: false, cost: 0.07 },
+    { shadows: false, plain: true, pixels: 0.35, smooth: false, cost: 0.04 },
+    { shadows: false, plain: true, pixels: 0.25, smooth: false, cost: 0.025 },
 ];
 const FIRST_BY_SOFTWARE = 4; // level at the start where no card draws
 const LONGEST_LED = 40; // [ms]: where a picture takes longer, and a hand leads, the next is coarser

@@ -7,6 +7,10 @@ const RIM = { colour: 0xbfd4ff, intensity: 0.35 };
 const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
 
 const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: filtering it makes the shadows soft
+const SHADOW_WIDTH = 4.4; // of what it covers, over the size of the scene
+// A surface is moved by that many pixels of the map along its normal: what is nearly along the light would have
+// stripes of its own shadow.
+const SHADOW_OFF = 2.5;
 
 class Lights {
     constructor(scene) {
@@ -31,14 +35,14 @@ class Lights {
         this.rim.position.copy(offset(-2.5, -1.5, 1.8));
         this.lamp.target.position.copy(target);
         this.rim.target.position.copy(target);
-        const camera = this.lamp.shadow.camera;
+        const { camera } = this.lamp.shadow, half = 0.5 * SHADOW_WIDTH * extent;
         Object.assign(camera, {
-            left: -2.2 * extent, right: 2.2 * extent, top: 2.2 * extent, bottom: -2.2 * extent,
+            left: -half, right: half, top: half, bottom: -half,
             near: 0.1 * extent, far: 8 * extent,
         });
         camera.updateProjectionMatrix();
         this.lamp.shadow.bias = -0.0004;
-        this.lamp.shadow.normalBias = 0.003 * extent;
+        this.lamp.shadow.normalBias = SHADOW_OFF * 2 * half / SHADOW_MAP_PIXELS;
     }
 }
 
@@ -56,10 +60,13 @@ function room() {
         const shade = context.createLinearGradient(0, 0, 0, size);
         shade.addColorStop(0.0, "#dfe6e9");
         shade.addColorStop(0.35, "#8b979c");
-        shade.addColorStop(0.55, "#4c5659");
-        shade.addColorStop(1.0, "#262c2f");
+        shade.addColorStop(0.55, "#6d787c");
+        shade.addColorStop(1.0, "#566166");
         context.fillStyle = shade;
         context.fillRect(0, 0, size, size);
+        context.filter = "blur(1px)";
+        context.fillStyle = "#f4f8fa"; // windows, which a blade that turns shows one after the other
+        for (const x of [6, 36]) context.fillRect(x, 14, 12, 30);
     });
     const ceiling = paint((context) => {
         context.fillStyle = "#7d888d";
@@ -69,7 +76,7 @@ function room() {
         for (const [x, y] of [[10, 12], [38, 8], [24, 38]]) context.fillRect(x, y, 16, 16);
     });
     const floor = paint((context) => {
-        context.fillStyle = "#23292c";
+        context.fillStyle = "#4a5458";
         context.fillRect(0, 0, size, size);
     });
     const texture = new THREE.CubeTexture([wall, wall, ceiling, floor, wall, wall]);

@@ -6,8 +6,10 @@
 const WET = {
     roughness: 0.55, metalness: 0, clearcoat: 0.5, clearcoatRoughness: 0.22, envMapIntensity: 0.55,
 };
-const STEEL = { roughness: 0.3, metalness: 0.8, envMapIntensity: 2.2 };
 const STEEL_COLOUR = 0xdfe4e8;
+const POLISHED = { roughness: 0.24, metalness: 1, envMapIntensity: 1.7 };
+const BRUSHED = { roughness: 0.42, metalness: 1, envMapIntensity: 0.75 };
+const FINISHES = { wet: WET, steel: POLISHED, brushed: BRUSHED };
 
 // `redraw` is called when a texture has been read.
 function materialOf(kind, { finish, ...properties }, maps, room, redraw) {
@@ -30,11 +32,11 @@ function materialOf(kind, { finish, ...properties }, maps, room, redraw) {
 // The same of physically based materials, as a card draws them at little cost; `room` is what they reflect,
 // filtered by roughness. Paint stays as it is.
 function richOf(material, room) {
-    if (material.userData.finish === undefined) return material;
-    const isSteel = material.userData.finish === "steel";
-    const rich = new THREE.MeshPhysicalMaterial({ ...(isSteel ? STEEL : WET), envMap: room, side: THREE.DoubleSide });
+    const finish = FINISHES[material.userData.finish];
+    if (finish === undefined) return material;
+    const rich = new THREE.MeshPhysicalMaterial({ ...finish, envMap: room, side: THREE.DoubleSide });
     for (const property of ["vertexColors", "map", "bumpMap", "bumpScale"]) rich[property] = material[property];
-    rich.color.copy(isSteel ? new THREE.Color(STEEL_COLOUR).convertSRGBToLinear() : material.color);
+    rich.color.copy(finish.metalness > 0 ? new THREE.Color(STEEL_COLOUR).convertSRGBToLinear() : material.color);
     rich.emissive.copy(material.emissive);
     return rich;
 }

@@ -30,7 +30,9 @@ class SceneView {
         this.plain = new Map(); // the same for coarse pictures
         this.isPlain = false;
         this.wires = new Map();
-        this.tissue = new Map(); // the meshes of skin and cut
+        this.tissue = new Map(); // the meshes of skin and cut, and their geometries as they came
+        this.smoothSkin = new SmoothSkin();
+        this.isSmooth = true; // whether the skin is drawn by it
         this.colours = new FieldColours();
         this.onScale = () => {};
         this.wireframe = false;
@@ -91,14 +93,15 @@ class SceneView {
         const path = command.path.split("/").filter((part) => part);
         const node = this.viewer.scene_tree.find([...path, "<object>"]);
         if (node.object.isMesh) {
-            if (!node.object.geometry.isKept) node.object.geometry.dispose();
+            const { geometry } = (path[0] === "tissue" && this.tissue.get(path[1])) || node.object;
+            if (!geometry.isKept) geometry.dispose();
             node.object.geometry = command.geometry;
             node.object.material = material;
         } else {
             const mesh = new THREE.Mesh(command.geometry, material);
             mesh.castShadow = !material.transparent;
             // On thin parts that move a shadow would be stripes: their own.
-            mesh.receiveShadow = path[0] === "tissue" || path[1] === "0";
+            mesh.receiveShadow = ["tissue", "stand"].includes(path[0]) || path[1] === "0";
             mesh.name = "<object>";
             node.set_object(mesh);
         }
@@ -120,12 +123,13 @@ class SceneView {
             this.wires.set(part, wires);
         }
         wires.geometry = mesh.geometry;
-        this.tissue.set(part, { mesh });
-        this.showTissue();
+        this.tissue.set(part, { mesh, geometry: mesh.geometry });
     }
 
-    // Draw with or without shadows, with plain materials, and with a share of the pixels in each direction.
-    setDrawing({ shadows, plain, pixels }) {
+    // Draw with or without shadows and smooth skin, with plain materials, and with a share of the pixels in each
+    // direction.
+    setDrawing({ shadows, plain, pixels, smooth }) {
+        this.isSmooth = smooth;
         this.lights.lamp.castShadow = shadows;
         this.viewer.renderer.setPixelRatio(pixels * this.fullPixelRatio);
         if (plain !== this.isPlain) {
@@ -134,9 +138,8 @@ class SceneView {
                 const { appearance } = mesh.userData;
                 if (appearance !== undefined) mesh.material = this.materialCalled(appearance);
             });
-            this.showTissue();
         }
-        this.viewer.set_dirty();
+        this.showTissue();
     }
 
     materialCalled(appearance) {
@@ -158,22 +161,29 @@ class SceneView {
     // A quantity as colours; "" for none.
     setQuantity(quantity) {
         this.colours.choose(quantity);
-        this.paintTissue();
-    }
-
-    setScales(tops) {
-        this.colours.setTops(tops);
-        this.paintTissue();
-    }
-
-    paintTissue() {
-        for (const { mesh } of this.tissue.values()) this.colours.paint(mesh.geometry);
         this.showTissue();
         this.onScale(this.colours);
     }
 
+    setScales(tops) {
+        this.colours.setTops(tops);
+        this.showTissue();
+        this.onScale(this.colours);
+    }
+
+    // The skin is smooth where no edges are shown, which lie on its triangles.
+    shapeTissue(hasEdges) {
+        const skin = this.tissue.get("skin"), cut = this.tissue.get("cut");
+        if (skin && cut) {
+            const isSmooth = this.isSmooth && !hasEdges;
+            skin.mesh.geometry = isSmooth ? this.smoothSkin.of(skin.geometry, cut.geometry) : skin.geometry;
+        }
+        for (const { mesh } of this.tissue.values()) this.colours.paint(mesh.geometry);
+    }
+
     showTissue() {
         const isGrid = this.shown === "grid", isCut = this.shown === "cut";
+        this.shapeTissue(isGrid || this.wireframe);
         for (const [part, { mesh }] of this.tissue) {
             const isFaint = isCut && part === "skin";
             const wires = this.wires.get(part);

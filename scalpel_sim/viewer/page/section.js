@@ -31,7 +31,7 @@ class Section {
         const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(
             new THREE.Vector3(...normal), new THREE.Vector3(...tip),
         );
-        const { ends, isMissed } = crossings(skin.mesh.geometry, plane.applyMatrix4(toScene.clone().invert()));
+        const { ends, isMissed } = crossings(skin.geometry, plane.applyMatrix4(toScene.clone().invert()));
         for (const end of ends) end.applyMatrix4(toScene);
         this.isMissed = isMissed; // a body in two halves is on both sides of it
         const eye = scene.worldToLocal(camera.getWorldPosition(new THREE.Vector3()));
