@@ -12,6 +12,8 @@ from tissue import FloatArray
 
 _USUAL_MASS, _USUAL_MOMENT = 0.07, 0.07 * 0.08**2
 """Mass [kg] and moment of inertia [kg m2] that the usual hand feels; see `Impedance`."""
+_SELF_MOTION: Final = 0.1
+"""Time within which what joints do without moving the edge ends [s]: a tenth of a stroke."""
 _LEAST_MOBILITY: Final = 1e-9
 """Mobility below which an edge does not move [1/kg or 1/(kg m2)]: that is rounding."""
 
@@ -46,6 +48,33 @@ def firm_impedance(arm: DrivenArm, *, lever: float = 0.0) -> Impedance:
         max(usual.rotational_stiffness, moment * turning**2, stiffness * lever**2),
         max(usual.rotational_damping, 2.0 * moment * turning, damping * lever**2),
     )
+
+
+def damping_of_self_motion(arm: DrivenArm) -> FloatArray:
+    """Return the damping of joints that an arm of more joints than motions needs, by joint.
+
+    The hand holds the edge alone. What joints can do without moving it, as an elbow that goes up,
+    would otherwise go on for ever once a stroke has begun it, until links meet. Damped, it ends
+    within `_SELF_MOTION`; the edge lags by no more than some 10 um, for hands are as firm as arms
+    are heavy.
+
+    Args:
+        arm: The arm, alone in its model, in a configuration in which it will work.
+
+    Returns:
+        Damping [N m s/rad or N s/m], shape (n_joints,); 0 where the edge says where joints are, and
+        of joints that do not carry it.
+    """
+    model, data = arm.model, arm.data
+    position, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jacSite(model, data, position, rotation, arm.hand.edge)
+    motions = np.vstack([position, rotation])
+    carries = np.abs(motions).max(axis=0) > 0.0
+    if carries.sum() <= np.linalg.matrix_rank(motions, tol=_LEAST_MOBILITY):
+        return np.zeros(model.nv)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    return np.where(carries, np.diag(inertia) / _SELF_MOTION, 0.0)
 
 
 def _felt(jacobian: FloatArray, inertia: FloatArray) -> float:

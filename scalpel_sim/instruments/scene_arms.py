@@ -10,7 +10,7 @@ import numpy as np
 
 from bridge import DeviceLimits, Fixture, TissueFrame
 from scalpel_sim.arm.arm import PSM, DrivenArm
-from scalpel_sim.arm.firm_hand import firm_impedance
+from scalpel_sim.arm.firm_hand import damping_of_self_motion, firm_impedance
 from scalpel_sim.arm.grasper import HALF_PAD, HeldArm
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.placement import (
@@ -177,8 +177,9 @@ def own_arm_in(
         *arms_with_graspers(scene.graspers, motions, boxes, frame, None, rooms),
         *_in_world(around, frame),
     ]
-    start = np.array(arm.data.qpos)
+    start, damping = np.array(arm.data.qpos), damping_of_self_motion(arm)
     arm, _ = _own(scene, stroke.blade_length, firm_impedance(arm), others)
+    arm.model.dof_damping[: len(damping)] += damping  # all joints are hinges or slides
     arm.reset(start)
     return StandingArms(arm, frame, stroke, others, room)
 

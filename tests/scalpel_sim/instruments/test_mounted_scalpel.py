@@ -205,6 +205,33 @@ def test_the_hand_is_as_firm_as_suits_the_arm_where_it_works_not_where_its_file_
     assert stiffness == pytest.approx(there.stiffness, rel=1e-9)
 
 
+def left_of_self_motion(arm):
+    """Push the joints so that the edge stays; return the share of their speed left after 0.3 s."""
+    position, rotation = np.zeros((2, 3, arm.model.nv))
+    mujoco.mj_jacSite(arm.model, arm.data, position, rotation, arm.hand.edge)
+    still = np.linalg.svd(np.vstack([position, rotation]))[2][6]
+    arm.data.qvel[:] = 0.2 * still
+    start = arm.blade.segment().tip
+    while arm.time < 0.3:
+        arm.step1()
+        arm.step2()
+    assert np.linalg.norm(arm.blade.segment().tip - start) < 1e-4
+    return np.linalg.norm(arm.data.qvel) / 0.2
+
+
+def test_an_elbow_that_the_edge_leaves_free_comes_to_rest(tmp_path):
+    arm = prepare(scene_of(tmp_path, "seven_hinges.urdf")).arm
+    start, damped = np.array(arm.data.qpos), left_of_self_motion(arm)
+    arm.model.dof_damping[:] = 0.0
+    arm.reset(start)
+    assert damped < 0.1 < 0.5 < left_of_self_motion(arm)
+
+
+def test_joints_that_the_edge_holds_are_not_damped_further(tmp_path):
+    for name, damping in (("slides.xml", 2.0), ("six_hinges.xml", 2.0)):
+        assert prepare(scene_of(tmp_path, name)).arm.model.dof_damping.tolist()[:3] == [damping] * 3
+
+
 def test_a_scalpel_is_as_long_as_the_stroke_needs_and_as_thick_as_the_blade(tmp_path):
     scene = changed(scene_of(tmp_path, "slides.xml"), blade=None)
     arm = prepare(scene).arm
