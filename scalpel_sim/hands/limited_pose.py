@@ -1,6 +1,8 @@
 """A pose that follows a wanted one: in its workspace, at a limited speed, never far behind."""
 
 import math
+from collections import deque
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -20,8 +22,16 @@ FOLLOWING_TIME = 0.02
 of them the blade should not stop."""
 
 FARTHEST_AHEAD, MOST_AHEAD_TURN = 0.04, 0.4
-"""How far the wanted pose may be ahead of the hand [m, rad]: what it does in a fifth of a second.
+"""Lead of the wanted pose over the hand, at most [m, rad]: what it does in a fifth of a second.
 What is requested beyond is lost, so that the blade stops soon after the person does."""
+
+PASSES_AT = MOST_SPEED * FOLLOWING_TIME
+"""Distance from a place of a way at which it goes on to the next one [m]: nearer it would slow
+down."""
+
+MOST_WAY_AHEAD = 0.4
+"""Longest way along the places that it was sent to [m]: what it does in two seconds. Of a longer
+one the oldest places are left out, so that it is never farther behind."""
 
 ARRIVED, ARRIVED_TURN = 1e-7, 1e-6
 """Distance [m] and angle [rad] from the wanted pose at which the hand is there: a thousandth of a
@@ -52,22 +62,26 @@ class LimitedPose:
         self.following_time = FOLLOWING_TIME
         """Time constant with which it follows [s]."""
         self._workspace = workspace
+        self._way: deque[FloatArray] = deque()
         self._is_limited = False
 
     def move(self, by: FloatArray) -> None:
         """Move the wanted pose by a displacement [m], as far as it may be ahead."""
+        self._way.clear()
         requested = self.wanted + by
         ahead = np.clip(requested, *self._workspace) - self.middle
         self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
         self._is_limited |= math.dist(requested.tolist(), self.wanted.tolist()) > ARRIVED
 
     def aim(self, to: FloatArray) -> None:
-        """Want it to be at a place [m], as near as its workspace goes.
+        """Want it to be at a place [m], as near as its workspace goes, by way of those before.
 
         Unlike a displacement a place may be far ahead: there it stops.
         """
-        np.clip(to, *self._workspace, out=self.wanted)
-        self._is_limited |= math.dist(to.tolist(), self.wanted.tolist()) > ARRIVED
+        place = np.clip(to, *self._workspace)
+        self._is_limited |= math.dist(to.tolist(), place.tolist()) > ARRIVED
+        self._way.append(place)
+        self._shorten_way()
 
     def turn(self, by: FloatArray) -> None:
         """Turn the wanted pose by a rotation vector [rad], as far as it may be ahead."""
@@ -87,17 +101,21 @@ class LimitedPose:
             middle: Where its middle is to be [m], shape (3,).
             rotation: How it is to be turned (w, x, y, z).
         """
+        self._way.clear()
         np.clip(middle, *self._workspace, out=self.wanted)
         self.wanted_rotation[:] = rotation
         self._is_limited |= math.dist(middle.tolist(), self.wanted.tolist()) > ARRIVED
 
     def rest(self) -> None:
         """Want it to be where it is."""
+        self._way.clear()
         self.wanted[:] = self.middle
         self.wanted_rotation[:] = self.rotation
 
     def step(self) -> bool:
         """Go one frame towards the wanted pose; return whether it was elsewhere."""
+        while self._way and math.dist(self.middle.tolist(), self.wanted.tolist()) < PASSES_AT:
+            self.wanted[:] = self._way.popleft()
         way, turn = self.wanted - self.middle, np.empty(3)
         mujoco.mju_subQuat(turn, self.wanted_rotation, self.rotation)
         distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
@@ -112,6 +130,14 @@ class LimitedPose:
             mujoco.mju_quatIntegrate(self.rotation, turn, min(share, most))
             mujoco.mju_normalize4(self.rotation)
         return distance > ARRIVED or angle > ARRIVED_TURN
+
+    def _shorten_way(self) -> None:
+        """Leave out the oldest places of a way that is too long."""
+        places = [self.wanted, *self._way]
+        length = sum(math.dist(a.tolist(), b.tolist()) for a, b in pairwise(places))
+        while length > MOST_WAY_AHEAD and len(self._way) > 1:
+            length -= math.dist(self.wanted.tolist(), self._way[0].tolist())
+            self.wanted[:] = self._way.popleft()
 
     def was_limited(self) -> bool:
         """Return whether a limit has held it back since the last call."""

@@ -4,7 +4,7 @@
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
 const SILENT_AFTER = 1600; // silence after which the run may have released [ms]
 const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
-const LONGEST_STEP = 10000; // and at most, where no picture shows it
+const LONGEST_STEP = 10000; // and at most, where no picture shows that it moves
 const N_LAGS_SHOWN = 30; // of which the median is shown
 const MOST_LAGS = 2000; // that are kept
 
@@ -22,6 +22,7 @@ class Hand {
         this.instruments = new Instruments(this);
         this.tip = null; // of the chosen instrument in the last picture [m], world frame
         this.isAtRest = true; // whether it was there in the picture before
+        this.movedAt = 0; // when a picture last showed that it moves [ms]
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
         this.lags = [];
         this.aim = new Aim(view);
@@ -99,7 +100,8 @@ class Hand {
         for (const [holder, since] of [...this.holders]) {
             const passed = performance.now() - since;
             const isDone = this.unshown.length === 0 && this.isAtRest && passed > SHORTEST_STEP;
-            if (isDone || passed > LONGEST_STEP) this.letGo(holder);
+            const isStuck = Math.min(passed, performance.now() - this.movedAt) > LONGEST_STEP;
+            if (isDone || isStuck) this.letGo(holder);
         }
     }
 
@@ -143,7 +145,7 @@ class Hand {
         if (!this.isEngaged || !this.isClosed) return;
         if (this.aim.held === null) this.aim.take();
         this.pointer = [clientX, clientY];
-        this.lead({ type: "aim", to: this.aim.at(clientX, clientY), stamp });
+        for (const to of this.aim.at(clientX, clientY)) this.lead({ type: "aim", to, stamp });
     }
 
     // The depth or the plane is another now.
@@ -177,6 +179,7 @@ class Hand {
         this.instruments.show(instruments, chosen, closed);
         this.isAtRest = this.tip !== null && tip.every((x, axis) => x === this.tip[axis]);
         this.tip = tip;
+        if (!this.isAtRest) this.movedAt = performance.now();
         if (ended && !this.hasEnded) this.letGoOfAll();
         this.hasEnded = ended;
         document.body.classList.toggle("engaged", engaged);

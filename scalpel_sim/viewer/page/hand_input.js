@@ -5,6 +5,7 @@
 const TURN_PER_PIXEL = 0.0044; // [rad]: a quarter of a degree
 const DEPTH_PER_WHEEL_PIXEL = 1e-5; // [m]: a notch of the wheel, 100 pixels, is a millimetre
 const PIXELS_PER_LINE = 33; // of a wheel that counts lines
+const FINEST_WAY = 6; // between two places that a browser reports at once [pixels]
 const FINE_STEP = 5e-4; // [m], of a key
 const FINE_TURN = 0.02; // [rad]
 
@@ -48,7 +49,7 @@ function listenToPointer(pane, canvas, hand) {
             hand.aim.letGo();
             hand.turn([-up * TURN_PER_PIXEL, right * TURN_PER_PIXEL, 0], event.timeStamp);
         } else {
-            hand.aimAt(event.clientX, event.clientY, event.timeStamp);
+            for (const each of placesOf(event)) hand.aimAt(each.clientX, each.clientY, event.timeStamp);
         }
     }, { capture: true });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
@@ -69,6 +70,18 @@ function listenToPointer(pane, canvas, hand) {
         if (event.shiftKey) reach.setSideways(reach.sideways + metres, event.timeStamp);
         else reach.setDepth(aim.depth + metres, event.timeStamp);
     }, { capture: true, passive: false });
+}
+
+// The places of a move of the pointer. Where pictures are few, a browser reports many of them at once: the instrument
+// goes along all, and cuts no corner.
+function placesOf(event) {
+    const places = [event];
+    const before = event.getCoalescedEvents?.() ?? []; // only pages that nobody can listen to are told
+    for (const each of before.reverse()) {
+        const { clientX, clientY } = places[0];
+        if (Math.hypot(each.clientX - clientX, each.clientY - clientY) >= FINEST_WAY) places.unshift(each);
+    }
+    return places;
 }
 
 function listenToKeys(hand) {

@@ -10,6 +10,8 @@ from scalpel_sim.hands.limited_pose import (
     FARTHEST_AHEAD,
     MOST_SPEED,
     MOST_TURN_RATE,
+    MOST_WAY_AHEAD,
+    PASSES_AT,
 )
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.instruments.scene_arms import ROOM
@@ -80,6 +82,22 @@ def test_an_engaged_hand_goes_to_a_place_however_far_it_is_and_stops_there(hand,
     hand.commands.append(Aim(beyond.tolist(), 2.0))
     middle = middles(poses(hand, 900))[-1]
     assert middle[1] == pytest.approx(simulation.workspace[1, 1], abs=1e-6)
+
+
+def test_a_hand_that_is_behind_goes_by_way_of_all_places_it_was_sent_to(hand, at_start):
+    corner = hand.tip + np.array([0.0, 0.02, 0.01])
+    end = corner + np.array([0.0, 0.02, -0.01])
+    hand.commands += [Engage(), Aim(corner.tolist(), 1.0), Aim(end.tolist(), 2.0)]
+    found = at_start[0].frame.points_to_world(poses(hand, 900)[:, :3])
+    assert np.linalg.norm(found - corner, axis=1).min() < PASSES_AT
+    assert found[-1] == pytest.approx(end, abs=1e-6)
+
+
+def test_of_a_way_of_more_than_a_second_the_oldest_places_are_left_out(hand, at_start):
+    near, far = hand.tip.tolist(), (hand.tip + np.array([0.0, 0.02, 0.0])).tolist()
+    hand.commands += [Engage(), *[Aim(far, 1.0), Aim(near, 1.0)] * 30]
+    way = np.abs(np.diff(poses(hand, 3000)[:, :3], axis=0)).sum()
+    assert 0.5 * MOST_WAY_AHEAD < way <= MOST_WAY_AHEAD, "it cuts corners by some millimetres"
 
 
 def test_a_released_hand_goes_to_no_place(hand):
