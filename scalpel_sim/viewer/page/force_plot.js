@@ -3,6 +3,8 @@
 
 const SECONDS_SHOWN = 5; // of simulated time
 const LOWEST_PEAK = 0.1; // [N] at the upper side at least: else noise would fill the plot
+const PIXELS = 2; // of the canvas, along one of the page
+const LABEL = 12; // height of the letters [pixels of the page]
 const BLADE_LINE = "#a33b30";
 const GRASPER_LINES = ["#12509e", "#3d6b2f"];
 
@@ -11,10 +13,9 @@ class ForcePlot {
         this.rows = []; // [s, N on the blade, N on each grasper]
         this.canvas = document.createElement("canvas");
         this.canvas.id = "chart";
-        this.canvas.width = 2 * 316;
-        this.canvas.height = 2 * 54;
         this.canvas.setAttribute("role", "img");
         element("readings").append(this.canvas);
+        new ResizeObserver(() => this.rows.length > 0 && this.draw()).observe(this.canvas);
     }
 
     // All rows since the last picture. After an undo the time is an earlier one, and what came later did
@@ -35,7 +36,7 @@ class ForcePlot {
         const found = [];
         for (const row of this.rows) {
             if (force >= row.length) continue;
-            const at = 2 * Math.round(x(row[0]) / 2), value = row[force], last = found[found.length - 1];
+            const at = PIXELS * Math.round(x(row[0]) / PIXELS), value = row[force], last = found[found.length - 1];
             if (last === undefined || last[0] !== at) found.push([at, value, value]);
             else [last[1], last[2]] = [Math.min(last[1], value), Math.max(last[2], value)];
         }
@@ -43,12 +44,16 @@ class ForcePlot {
     }
 
     draw() {
-        const { width, height } = this.canvas;
+        const { clientWidth, clientHeight } = this.canvas;
+        if (clientWidth === 0) return; // a low window has no room for it
+        const width = PIXELS * clientWidth, height = PIXELS * clientHeight;
+        if (this.canvas.width !== width) this.canvas.width = width;
+        if (this.canvas.height !== height) this.canvas.height = height;
         const context = this.canvas.getContext("2d", { willReadFrequently: true });
         const now = this.rows[this.rows.length - 1][0];
         const peak = this.rows.reduce((most, [, ...forces]) => Math.max(most, ...forces), LOWEST_PEAK);
         const x = (time) => width - 6 - (width - 12) * (now - time) / SECONDS_SHOWN;
-        const y = (force) => height - 6 - (height - 34) * force / peak;
+        const y = (force) => height - 6 - (height - PIXELS * LABEL - 10) * force / peak;
         context.clearRect(0, 0, width, height);
         context.lineWidth = 3;
         context.lineJoin = "round";
@@ -62,8 +67,8 @@ class ForcePlot {
             context.stroke();
         }
         context.fillStyle = "#43545b";
-        context.font = "20px sans-serif";
-        context.fillText(`${peak.toFixed(2)} N, last ${SECONDS_SHOWN} s`, 6, 20);
+        context.font = `${PIXELS * LABEL}px system-ui, sans-serif`;
+        context.fillText(`${peak.toFixed(2)} N, last ${SECONDS_SHOWN} s`, 0, PIXELS * LABEL);
         this.canvas.setAttribute("aria-label",
             `forces over the last ${SECONDS_SHOWN} seconds, at most ${peak.toFixed(2)} newtons`);
     }

@@ -63,7 +63,7 @@ function chooseIn(list, choose) {
 }
 
 // On a small screen the choices would hide the tissue.
-if (window.matchMedia("(max-width: 640px), (max-height: 480px)").matches) element("display").open = false;
+if (window.matchMedia("(max-width: 960px), (max-height: 480px)").matches) element("display").open = false;
 chooseIn(element("shown"), setShown);
 chooseIn(element("quantity"), setQuantity);
 onShortcut((key) => {
