@@ -31,7 +31,7 @@ from tissue import (
 )
 
 _DRAWN = 0.035
-"""How far a hand draws the blade in each stroke [m]."""
+"""Distance by which a hand draws the blade in each stroke [m]."""
 
 
 def checked_steps(scene: str = "organ", /, *, no_audit: Flag = False) -> BenchmarkResult:

@@ -24,7 +24,7 @@ _PERIOD = 1e-3
 _REACH = np.array([0.004, 0.03, 0.008])
 """Amplitude of the stylus along x, y and z [m]."""
 _RATES = np.array([1.3, 0.7, 2.1])
-"""How fast it goes to and fro [rad/s]."""
+"""Angular frequency of its way to and fro [rad/s]."""
 _SPURT = 10.0
 """Every so many seconds the stylus goes at ten times the speed for a tenth of a second [s]."""
 _AWAY, _SPEED = np.array([0.0, -1.0, 0.0]), 0.1

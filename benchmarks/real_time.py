@@ -41,7 +41,7 @@ AS_SHIPPED = "as shipped"
 """Stands for the material of the scene itself."""
 RUN_MODES = ("plain", "account", "viewer")
 QUICK_SECONDS = 0.05
-"""How much of a stroke is simulated for a quick test [s]."""
+"""Time of a stroke that is simulated for a quick test [s]."""
 _MS_PER_S = 1e3
 
 _ABOUT = (

@@ -63,7 +63,7 @@ _CUT_BLOCKS: dict[int, BlockCells] = {
 """Cells of the blocks that are cut, by their number of tetrahedra."""
 
 _ABOVE = 2.0
-"""How far the edge reaches above the upper side [cells]."""
+"""Height of the edge above the upper side [cells]."""
 _ASIDE = 0.37
 """Distance of the slit from the planes of the grid [cells]: no part of it runs along existing
 faces."""
@@ -123,7 +123,7 @@ class Slit(NamedTuple):
     n_entry: int
     """First frames, which are not counted: the edge enters the body."""
     depth: float
-    """How far the edge reaches below the upper side [cells]."""
+    """Depth of the edge below the upper side [cells]."""
 
     def edge(self, cells: BlockCells, frame: int) -> BladeSegment:
         """Return the upright edge in a frame."""

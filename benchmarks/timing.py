@@ -19,8 +19,8 @@ Largest = Annotated[int | None, Parameter(help="Omit larger bodies [tetrahedra].
 """`--largest`, of benchmarks in bodies of several sizes."""
 
 _TURN = 0.1
-"""How long a case runs in each round [s]: long compared with a time slice of the operating system,
-short compared with the changes of load on a shared machine."""
+"""Time for which a case runs in each round [s]: long compared with a time slice of the operating
+system, short compared with the changes of load on a shared machine."""
 LEAST_SAMPLES = 3
 """Fewest samples of a case in a round, where one sample takes longer than its turn."""
 SHORTEST_SAMPLE = 2e-4

@@ -1,4 +1,4 @@
-"""How a blade sweep reaches the tissue. The arm side cannot distinguish one link from another."""
+"""Ways of a blade sweep to the tissue. The arm side cannot distinguish one link from another."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SceneView(NamedTuple):
     """A camera of a scene, which stands still in the frame of the tissue."""
 
     name: str
-    """What it is called."""
+    """Name of it."""
     eye: tuple[float, float, float]
     """Where it is [m]."""
     target: tuple[float, float, float]

@@ -17,7 +17,7 @@ _SPEED = 0.06
 POSE_EVERY = 1e-3
 """Distance between two poses of a stroke [m]."""
 _ABOVE = 0.35
-"""How far the edge reaches above the body, as a share of its height."""
+"""Height of the edge above the body, as a share of its height."""
 
 
 class PlannedCut(NamedTuple):
@@ -28,7 +28,7 @@ class PlannedCut(NamedTuple):
     """Corners of the path seen from above, as shares of the body's extent along x and y; shape
     (n, 2). Between them it runs smoothly."""
     depth: float
-    """How far the tip reaches below the body's upper side, as a share of its height."""
+    """Depth of the tip below the body's upper side, as a share of its height."""
     lean: float = 0.0
     """By how much the edge leans towards +x [rad]."""
 

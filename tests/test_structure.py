@@ -1,6 +1,7 @@
 """Limits on the size of files and functions, and one defining module for each public name."""
 
 import ast
+import re
 from collections import defaultdict
 from pathlib import Path
 
@@ -90,6 +91,14 @@ def test_every_public_name_is_defined_in_one_module():
         for name in public_names(path):
             modules[name].append(named(path))
     assert {name: paths for name, paths in modules.items() if len(paths) > 1} == {}
+
+
+def test_no_docstring_begins_as_a_question_or_a_request():
+    """Each is a noun or an imperative. Those of `tissue` are not all so yet."""
+    begins = re.compile(r'^ *"""(What|How|Let|Have|Say|Tell) ', re.MULTILINE)
+    found = {named(path): begins.findall(path.read_text()) for path in SOURCES}
+    others = {name: words for name, words in found.items() if not name.startswith("tissue/")}
+    assert {name: words for name, words in others.items() if words} == {}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -1,4 +1,4 @@
-"""How far a body has sunk in its first swing under gravity: converged motion, and the error of it.
+"""Sinking of a body in its first swing under gravity: converged motion, and the error of it.
 
 The converged motion of each law is computed here in NumPy, apart from all engines: so an engine is
 compared with its own law, and what is left is the error of its time step and its solver.

@@ -47,7 +47,7 @@ _MISSING = ("ModuleNotFoundError", "ImportError")
 
 
 class PeerTurn(NamedTuple):
-    """What a case did in one turn."""
+    """Outcome of a case in one turn."""
 
     seconds: FloatArray
     """CPU time per step of each sample [s]."""

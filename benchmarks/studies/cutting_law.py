@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 SIZE = (0.045, 0.09, 0.016)
 """Edges of the blocks across, along the cut and up [m]."""
 MESHES = (("block", 8e-3), ("lattice", 8e-3), ("lattice", 4.5e-3))
-"""How cells are divided into tetrahedra, and their size [m]."""
+"""Division of cells into tetrahedra, and their size [m]."""
 STEADY = (0.55, 0.85)
 """Part of the length of the block in which a cut counts as steady."""
 AREAS_OVER, PAST = 0.02, 0.016
@@ -65,7 +65,7 @@ class LawCut(NamedTuple):
     x: float
     """Where it crosses the middle of the block [m]."""
     depth: float
-    """How deep the tip is [m]; more than the block is high: through, with both sides held."""
+    """Depth of the tip [m]; more than the block is high: through, with both sides held."""
     speed: float = 0.1
     """Speed of the edge [m/s]."""
     angle: float = 0.0
@@ -73,7 +73,7 @@ class LawCut(NamedTuple):
     slope: float = 0.0
     """Of the edge against the upright [degrees]; the tip is behind."""
     slide: float = 0.0
-    """How fast the edge slides along itself, per its speed."""
+    """Speed at which the edge slides along itself, per its speed."""
 
     @property
     def is_through(self) -> bool:

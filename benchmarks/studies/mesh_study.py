@@ -86,9 +86,9 @@ class Model(NamedTuple):
     averaged: bool = True
     """Whether dilatation is averaged over nodes, as in the engine."""
     element: str = "plain"
-    """How tetrahedra are strained (`SolverSettings.element`)."""
+    """Strain of tetrahedra (`SolverSettings.element`)."""
     shape: Callable[..., TetrahedralMesh] = block
-    """How cells are divided into tetrahedra."""
+    """Division of cells into tetrahedra."""
 
 
 def models() -> list[Model]:

@@ -24,7 +24,7 @@ from tissue import BladeShape, BladeSweep, Chunks, FloatArray, IntArray
 
 
 class Overlaps(NamedTuple):
-    """What the swept box of the blade overlaps."""
+    """Overlaps of the swept box of the blade."""
 
     tissue: bool
     """Whether it overlaps the tissue's boxes."""

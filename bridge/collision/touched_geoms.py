@@ -17,11 +17,11 @@ if TYPE_CHECKING:  # the side without the tissue starts without its compiler
     from tissue import Tissue
 
 NODE_SIZES_AROUND = 3.0
-"""How far from the body, in mean node sizes, a geom is taken for near: for faces that it may
-touch between their corners, and for what moves faster in the step than before."""
+"""Distance from the body, in mean node sizes, at which a geom is taken for near: for faces that it
+may touch between their corners, and for what moves faster in the step than before."""
 
 SLACK = 1.0
-"""How far geoms and tissue may move, in mean node sizes, until the collision library is queried
+"""Motion of geoms and tissue, in mean node sizes, after which the collision library is queried
 again. Larger: more geoms are taken for near; smaller: a call of 0.1 ms in more frames."""
 
 
@@ -55,7 +55,7 @@ class TouchedGeoms:
 
     @property
     def loads(self) -> GeomLoads:
-        """What the tissue did to the geoms in the last step."""
+        """Forces of the tissue on the geoms in the last step."""
         return GeomLoads(*self._contact.wrenches())
 
     def forces(self) -> GeomForces:

@@ -158,7 +158,7 @@ class Coupling:
 
     @property
     def passivity(self) -> PassivityCounters:
-        """What the passivity observer counted, and what the controller did."""
+        """Energy that the passivity observer counted, and actions of the controller."""
         return self._passivity.counters
 
     @property

@@ -11,7 +11,7 @@ _ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class DeviceLimits:
-    """What the haptic device can exert.
+    """Force and torque that the haptic device can exert.
 
     Raises:
         ValueError: a limit is not positive.

@@ -60,7 +60,7 @@ class DeviceClient:
             self.description = self._connection.request(
                 MessageKind.HELLO, b"", MAP_BYTES, DEVICE_DESCRIPTION.unpack
             )
-            """What there is to know of the run."""
+            """Description of the run."""
         except LinkError:
             self.close()
             raise

@@ -24,14 +24,14 @@ was stopped meanwhile may take for ever, and then the record before counts."""
 
 
 class DeviceCommand(NamedTuple):
-    """What the device wants."""
+    """Wish of the device."""
 
     hold: int
     """Number of the time that it has taken hold; 0: it does not hold the blade."""
     heard_at: float
     """When its last pose came, by the monotonic clock of the machine [s]."""
     period: float
-    """How often a pose is to come [s]."""
+    """Interval at which a pose is to come [s]."""
     has_ended: bool
     """Whether it has ended the stroke."""
     n_lost: int
@@ -57,7 +57,7 @@ NOTHING_WANTED = DeviceCommand(
     CartesianPose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])),
     CartesianPose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])),
 )
-"""What is wanted before a device has come."""
+"""Wish before a device has come."""
 
 _COMMAND_NUMBERS = 7 + 2 * 7
 _REPORT_NUMBERS = 7 + 4 * 7 + 6 + 36
@@ -111,7 +111,7 @@ class Exchange:
 
     @property
     def command(self) -> DeviceCommand:
-        """What the device wants."""
+        """Wish of the device."""
         content = self._commands.read()
         if not content:
             return NOTHING_WANTED
@@ -137,7 +137,7 @@ class Exchange:
 
     @property
     def report(self) -> BladeReport | None:
-        """How the blade is; None before the run has said so."""
+        """State of the blade; None before the run has said so."""
         content = self._reports.read()
         if not content:
             return None

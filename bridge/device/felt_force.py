@@ -1,4 +1,4 @@
-"""What a device feels between two frames: the last force, its stiffness, and a tank of energy.
+"""Force on a device between two frames: the last force, its stiffness, and a tank of energy.
 
 A run that is slower than real time has a new force every few milliseconds, of a blade that is a
 little behind the stylus. A device needs one each millisecond, which must not jump, and with which
@@ -118,7 +118,7 @@ class FeltForce:
         self.report: BladeReport | None = None
         """The last frame that it knows."""
         self.energy = 0.0
-        """What the hand has put in and not got back [J], at most `ENERGY_CREDIT`."""
+        """Work that the hand has put in and not got back [J], at most `ENERGY_CREDIT`."""
         self._model: _Model | None = None
         self._ahead, self._felt, self._difference = np.zeros(6), np.zeros(6), np.zeros(6)
         self._ramp = self._product = self._square = self._work_at_start = 0.0
@@ -189,7 +189,7 @@ class FeltForce:
         return _Model(report.wrench, share * report.stiffness, self._lever)
 
     def _reduce_difference(self, seconds: float) -> None:
-        """Let what is left of former models go on for so long [s]."""
+        """Continue what is left of former models for so long [s]."""
         share = min(seconds / self._ramp, 1.0) if self._ramp > seconds else 1.0
         self._ramp = max(self._ramp - seconds, 0.0)
         most = SLEW * seconds * max(1.0, _size(self._felt, self._lever))

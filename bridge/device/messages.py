@@ -39,9 +39,9 @@ class DeviceState(NamedTuple):
     measured_cp: CartesianPose
     """Where the blade is: the origin is its tip, +y points from heel to tip, -z cuts."""
     measured_cf: Wrench
-    """What a device that drives exerts now: the wrench of the tissue on the blade within the limits
-    of the simulated arm, continued to this moment; force and torque about the tip, world frame. As
-    measured, while none drives."""
+    """Wrench that a device that drives exerts now: that of the tissue on the blade within the
+    limits of the simulated arm, continued to this moment; force and torque about the tip, world
+    frame. As measured, while none drives."""
     is_engaged: bool
     """Whether the device drives the blade now."""
     has_ended: bool
@@ -53,9 +53,9 @@ class DeviceState(NamedTuple):
     n_dropped: int = 0
     """Messages that were refused, such as a pose that is not finite."""
     stylus_distance: float = 0.0
-    """How far the stylus is from where the blade is led, since it took hold [m]."""
+    """Distance of the stylus from where the blade is led, since it took hold [m]."""
     stylus_angle: float = 0.0
-    """How far it is turned from there [rad]."""
+    """Angle by which it is turned from there [rad]."""
 
 
 class DeviceDescription(NamedTuple):
@@ -77,7 +77,7 @@ class ServoRequest(NamedTuple):
     stamp: float
     """When it was sent, by the device's clock [s]."""
     period: float
-    """How often the device means to send one [s]."""
+    """Interval at which the device means to send one [s]."""
     servo_cp: CartesianPose
     """The pose."""
     holds: bool

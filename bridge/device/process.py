@@ -33,10 +33,10 @@ _PROGRAM = "from bridge.device.process import answer_a_device; answer_a_device()
 
 
 class DeviceEnd(NamedTuple):
-    """What the process needs to know of a run."""
+    """Description of a run for the process."""
 
     description: DeviceDescription
-    """What a device is told of it."""
+    """Description of it for a device."""
     limits: DeviceLimits
     """Largest force and torque that it gets."""
     lever: float
@@ -114,7 +114,7 @@ class DeviceProcess:
         return self._exchange.command
 
     def tell(self, report: BladeReport) -> None:
-        """Tell how the blade is."""
+        """Pass on how the blade is."""
         self._exchange.report = report
 
     def close(self) -> None:

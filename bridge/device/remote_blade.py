@@ -99,7 +99,7 @@ class RemoteBlade:
         self._exchange.command = self._command
 
     def count(self, n_missed: int, n_dropped: int) -> None:
-        """Tell the run what was counted of its devices."""
+        """Report what was counted of its devices to the run."""
         if (n_missed, n_dropped) != (self._command.n_missed, self._command.n_dropped):
             self._command = self._command._replace(n_missed=n_missed, n_dropped=n_dropped)
             self._exchange.command = self._command

@@ -37,14 +37,14 @@ WAIT_SECONDS = 0.1
 
 
 class Served(NamedTuple):
-    """What is on the other side, as messages to a person name it."""
+    """The other side, as messages to a person name it."""
 
     name: str
     """Such as "the tissue"."""
     missing: str
     """Such as "no tissue is served"."""
     remedy: str
-    """What to do where it is missing."""
+    """Advice where it is missing."""
 
 
 class Connection:

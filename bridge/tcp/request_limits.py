@@ -1,4 +1,4 @@
-"""What one request to a tissue may cost: a server that computes for long serves nobody."""
+"""Limits of the cost of one request to a tissue: a server that computes for long serves nobody."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
     from tissue import BladeSweep, Tissue
 
 FARTHEST_IN_A_REQUEST = 100.0
-"""How far the edge, or a driven frame, may move in a request, in mean node sizes of the body.
+"""Farthest motion of the edge, or of a driven frame, in a request, in mean node sizes of the body.
 The edge is followed in quarters of a node size, so that these are 400 increments, and 15 times as
 many where the step goes wrong and is repeated. In a frame of a millisecond a scalpel moves by a
 hundredth of a node size."""

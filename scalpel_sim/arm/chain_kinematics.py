@@ -18,13 +18,14 @@ from scalpel_sim.errors import UsageError
 from tissue import BladeSegment, BoolArray, FloatArray
 
 NEAR_PLACE: Final = 5e-4
-"""How far the middle of the edge may stay from a pose [m]. The hand is a spring and pulls it on."""
+"""Distance of the middle of the edge from a pose, at most [m]. The hand is a spring and pulls it
+on."""
 NEAR_TURN: Final = 5e-3
 """By how much the edge may be turned from a pose [rad], likewise."""
 _ITERATIONS: Final = 200
 """Steps for a pose, at most."""
 LONGEST_STEP: Final = 0.2
-"""How far a joint moves in a step, at most [rad, m]: the Jacobian is that of where it is."""
+"""Motion of a joint in a step, at most [rad, m]: the Jacobian is that of where it is."""
 _STILL: Final = 1e-5
 """Step below which joints have come to rest [rad, m]: no motion brings the edge nearer."""
 _DAMPING: Final = 1e-3
@@ -74,7 +75,7 @@ class Followed(NamedTuple):
     number: int
     """Number of that pose."""
     overlaps: Sequence[Overlap] = ()
-    """What overlaps at the first pose at which anything of the arm does, deepest first."""
+    """Parts that overlap at the first pose at which anything of the arm does, deepest first."""
 
     @property
     def is_whole(self) -> bool:

@@ -78,7 +78,7 @@ class ArmParts:
                 )
             )
         self.reach = JointReach(model, data, self._geoms)
-        """How far the parts can have moved."""
+        """Bound on how far the parts can have moved."""
         self._positions, self._axes = data.geom_xpos, data.geom_xmat
         self._positions_before, self._axes_before = self._positions.copy(), self._axes.copy()
         where = self.reach.angles, self.reach.start, self.reach.reach

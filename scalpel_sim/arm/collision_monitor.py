@@ -20,7 +20,7 @@ from scalpel_sim.arm.standing import collide
 from tissue import FloatArray, IntArray
 
 FLOOR_MARGIN = 0.02
-"""How far the floor reaches beyond the body [m]. For the tissue it is infinite, but it must not
+"""Width of the floor beyond the body [m]. For the tissue it is infinite, but it must not
 reach the arm's base."""
 
 CLEARANCE_SHARE = 0.9
@@ -35,7 +35,7 @@ _PASS = (
     ", and MuJoCo lets them pass through each other (contype, conaffinity), where the device would "
     "stop. Move the stroke, or let them collide"
 )
-"""What happens where a pair meets."""
+"""Consequence where a pair meets."""
 
 _log = logging.getLogger("scalpel_sim")
 

@@ -36,8 +36,8 @@ HALF_PAD = 0.5 * PAD_LENGTH
 """From the middle between the pads to either end of them [m]."""
 
 FORWARD = (0.0, 0.0, -1.0)
-"""What a blade calls forward, in the frame of the shaft: across the shaft and across the way of the
-jaws. A grasper is led as a blade is."""
+"""Direction that a blade calls forward, in the frame of the shaft: across the shaft and across the
+way of the jaws. A grasper is led as a blade is."""
 
 _PARTS = ("shaft", *_JAWS)
 """Names of the bodies of a grasper."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from scalpel_sim.arm.kinematics import (
     TABLE_CLEARANCE,
+    ArmPoses,
     Fit,
     InstrumentPath,
     Places,
@@ -141,23 +142,9 @@ class Geometry(NamedTuple):
         up = self.shoulder + upper * np.sin(shoulder) + forearm * np.sin(level)
         return np.stack([-np.sin(waist) * out, np.cos(waist) * out, up], axis=-1)
 
-    def spheres(
-        self,
-        path: InstrumentPath,
-        angles: FloatArray,
-        bases: FloatArray,
-        turns: FloatArray,
-        mount_angle: float,
-    ) -> Spheres:
-        """Return spheres that cover an arm at n poses, or at one pose from n bases.
-
-        Args:
-            path: The poses, or the one.
-            angles: Of the joints [rad], shape (n, 6).
-            bases: Where the arm stands, tissue frame [m], shape (n, 3).
-            turns: Axes of the base as columns, shape (n, 3, 3).
-            mount_angle: Between stylus and instrument [rad].
-        """
+    def spheres(self, poses: ArmPoses) -> Spheres:
+        """Return spheres that cover the arm: its base, its links and its stylus."""
+        path, angles, bases, turns, mount_angle = poses
         c, s = math.cos(mount_angle), math.sin(mount_angle)
         stylus = path.axes @ np.array([0.0, c, -s])
         gimbal = path.positions - self.neck * stylus

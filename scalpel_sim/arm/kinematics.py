@@ -1,4 +1,4 @@
-"""What the search for a place needs to know of an arm: where it can stand, and what it reaches."""
+"""Facts of an arm that the search for a place needs: where it can stand, and what it reaches."""
 
 from typing import NamedTuple, Protocol
 
@@ -46,7 +46,7 @@ class Places(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How the base of an arm fits at places."""
+    """Fit of the base of an arm at places."""
 
     can_stand: BoolArray
     """Whether it can stand there at all, shape (n,)."""
@@ -63,6 +63,21 @@ class Reach(NamedTuple):
     margin: FloatArray
     """Smallest distance of a joint from an end of its range, as a fraction of half the range:
     1 in the middle, negative beyond. Shape (...)."""
+
+
+class ArmPoses(NamedTuple):
+    """Poses of an arm: n along a path, or one from n bases."""
+
+    path: InstrumentPath
+    """Poses of its instrument, n or one."""
+    angles: FloatArray
+    """Positions of its joints [rad, m], shape (n, n_joints)."""
+    bases: FloatArray
+    """Places of its base, tissue frame [m], shape (n, 3)."""
+    turns: FloatArray
+    """Axes of its base as columns, shape (n, 3, 3)."""
+    mount_angle: float
+    """Angle between its instrument and the blade [rad]."""
 
 
 class Kinematics(Protocol):
@@ -91,23 +106,8 @@ class Kinematics(Protocol):
     def links(self, angles: FloatArray) -> FloatArray:
         """Return points along its links, in the frame of the base [m], shape (..., n, 3)."""
 
-    def spheres(
-        self,
-        path: InstrumentPath,
-        angles: FloatArray,
-        bases: FloatArray,
-        turns: FloatArray,
-        mount_angle: float,
-    ) -> Spheres:
-        """Return spheres that cover the arm at n poses, or at one pose from n bases.
-
-        Args:
-            path: The poses, or the one.
-            angles: Of the joints, shape (n, n_joints).
-            bases: Where the arm stands, tissue frame [m], shape (n, 3).
-            turns: Axes of the base as columns, shape (n, 3, 3).
-            mount_angle: Between the instrument and the blade [rad].
-        """
+    def spheres(self, poses: ArmPoses) -> Spheres:
+        """Return spheres that cover the arm, and not what it holds."""
 
 
 TABLE_CLEARANCE = 0.01

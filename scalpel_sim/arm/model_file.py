@@ -82,7 +82,7 @@ def _options(robot: ET.Element) -> ET.Element:
 
 
 def _balance(robot: ET.Element, options: ET.Element) -> None:
-    """Have inertias that no solid can have replaced, and say whose.
+    """Replace inertias that no solid can have, and report whose.
 
     Each principal moment is at most the sum of the others. MuJoCo takes their mean instead.
     """

@@ -60,7 +60,7 @@ def overlaps(model: mujoco.MjModel, data: mujoco.MjData) -> list[Overlap]:
 
 
 def pass_where_they_overlap(spec: mujoco.MjSpec, name: str) -> None:
-    """Let bodies of an arm pass through each other that overlap in the configuration of its file.
+    """Make bodies of an arm pass through each other that overlap in the configuration of its file.
 
     So do a base that stands still and what a joint has move on it: their friction would hold it.
     What bodies overlap with in the world of the model, as a floor, still stops them.
@@ -124,5 +124,5 @@ def first_configuration(model: mujoco.MjModel) -> FloatArray:
 
 @cache
 def _say_once(text: str) -> None:
-    """Say something under --verbose: a run reads the model of its arm up to three times."""
+    """Log something under --verbose: a run reads the model of its arm up to three times."""
     _log.info("%s", text)

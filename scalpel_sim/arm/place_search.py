@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.arm.kinematics import (
+    ArmPoses,
     InstrumentPath,
     Kinematics,
     Places,
@@ -141,7 +142,7 @@ def spheres_along(
     turn, n = turn_about_z(yaw), len(path.positions)
     reached = measures.reach((path.positions - base) @ turn, turn.T @ path.axes, mount_angle)
     bases, turns = np.broadcast_to(base, (n, 3)), np.broadcast_to(turn, (n, 3, 3))
-    return measures.spheres(path, reached.angles, bases, turns, mount_angle)
+    return measures.spheres(ArmPoses(path, reached.angles, bases, turns, mount_angle))
 
 
 def _are_clear_at_start(
@@ -164,7 +165,7 @@ def _are_clear_at_start(
     angles = measures.reach(positions[:, :1], axes[:, :1], mount_angle).angles[:, 0]
     first = path._replace(positions=path.positions[:1], axes=path.axes[:1])
     bases, turns = places.bases, turns_about_z(places.yaws)
-    own = measures.spheres(first, angles, bases, turns, mount_angle)
+    own = measures.spheres(ArmPoses(first, angles, bases, turns, mount_angle))
     clear = np.ones(len(bases), bool)
     for other in others:
         for centre, radius in zip(other.centres[0], other.radii, strict=True):

@@ -44,8 +44,8 @@ DENSE_SAMPLES = 65
 """Number of poses along the stroke at which the chosen place is confirmed."""
 
 NEEDED_MARGIN = 0.04
-"""How far from the ends of their ranges the joints must stay, as a fraction of half the range. The
-hand yields, and a joint that meets its stop would push back."""
+"""Distance that joints must keep from the ends of their ranges, as a fraction of half the range.
+The hand yields, and a joint that meets its stop would push back."""
 
 SMALLEST_SCALE, SCALE_HALVINGS = 1e-3, 7
 """Where an error message looks for the scale at which the arm would reach: from this up to 1, to

@@ -8,6 +8,7 @@ import numpy as np
 
 from scalpel_sim.arm.kinematics import (
     TABLE_CLEARANCE,
+    ArmPoses,
     Fit,
     InstrumentPath,
     Places,
@@ -70,7 +71,7 @@ class PsmGeometry(NamedTuple):
     """Lengths and ranges of a patient-side manipulator, whose origin is its remote centre."""
 
     retracted: float
-    """How far the wrist is before the remote centre where the insertion is 0 [m]."""
+    """Distance of the wrist before the remote centre where the insertion is 0 [m]."""
     wrist: float
     """Distance between the axes of the wrist [m]."""
     neck: float
@@ -188,24 +189,10 @@ class PsmGeometry(NamedTuple):
         upright = np.concatenate([tilted, bars, housing], axis=-2)
         return np.asarray(upright @ np.swapaxes(turn, -1, -2))
 
-    def spheres(
-        self,
-        path: InstrumentPath,
-        angles: FloatArray,
-        bases: FloatArray,
-        turns: FloatArray,
-        mount_angle: float,
-    ) -> Spheres:
-        """Return spheres that cover it at n poses, or at one pose from n bases.
-
-        Args:
-            path: The poses, or the one.
-            angles: Of the joints, shape (n, 8).
-            bases: Where the remote centre is, tissue frame [m], shape (n, 3).
-            turns: Axes of the base as columns, shape (n, 3, 3).
-            mount_angle: Between the jaws and the instrument [rad]; what it holds is not covered.
-        """
-        centres = bases[:, None] + self.links(angles) @ np.swapaxes(turns, 1, 2)
+    def spheres(self, poses: ArmPoses) -> Spheres:
+        """Return spheres that cover its links; its base is the remote centre."""
+        links = self.links(poses.angles)
+        centres = poses.bases[:, None] + links @ np.swapaxes(poses.turns, 1, 2)
         return Spheres(np.asarray(centres), _RADII)
 
 

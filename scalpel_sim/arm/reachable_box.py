@@ -17,7 +17,7 @@ SMALLEST_SHARE = 1.0 / 16.0
 around it that is a few millimetres each way, in which nobody can cut."""
 
 NEAR_ENOUGH = 1e-3
-"""How near the side of a box comes to where the reach of the arm ends [m]."""
+"""Distance between the side of a box and the end of the arm's reach, at most [m]."""
 
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1))
 """Corners of a box in an order in which each is next to the next: 0 is low, 1 is high."""

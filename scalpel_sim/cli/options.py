@@ -77,7 +77,7 @@ _AS_OPTION = {
     "gravity": " On the command line X,Y,Z.",
     "prony": " On the command line G:TAU of each term, such as 0.3:0.1,0.2:5.",
 }
-"""What the help of an option says besides the text of its key."""
+"""Text of the help of an option besides that of its key."""
 
 _WITH_USUAL = ("solver", "arm")
 """Tables whose keys have a usual value that few scenes replace: help shows it."""
@@ -167,7 +167,7 @@ class BladeOptions:
 @with_keys(_SOLVER)
 @dataclass(frozen=True)
 class SolverOptions:
-    """How the mesh is cut, and how the motion is computed."""
+    """Methods that cut the mesh and compute the motion."""
 
 
 @with_keys(_ARM)
@@ -189,7 +189,7 @@ class ArmOptions:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class TissueOptions:
-    """What the process that holds the tissue must know: body, material, blade and solver."""
+    """Options for the process that holds the tissue: body, material, blade and solver."""
 
     body: BodyOptions = BodyOptions()
     material: MaterialOptions = MaterialOptions()

@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # `--help` should not wait for it
 JSON_FILE, PAGE_FILE = "validation.json", "validation.md"
 _FOLDER = Path("out/validate")
 _SECONDS_PER_LINE = 5.0
-"""How often a case says how far it is [s]."""
+"""Interval at which a case reports its progress [s]."""
 
 
 def validate(

@@ -20,7 +20,7 @@ MOVE_TURN_RATE = 0.5
 """Highest turn rate on it [rad/s]."""
 
 MOST_LEAD, MOST_LEAD_ANGLE = 0.03, 0.3
-"""How far the link leads the blade ahead at most [m, rad]: of what is farther than 40 mm or 0.4 rad
+"""Lead of the link over the blade, at most [m, rad]: of what is farther than 40 mm or 0.4 rad
 ahead the run forgets the rest, and where the blade is would no longer be where it is led."""
 
 _PAUSE = 0.5
@@ -47,7 +47,7 @@ class Twist(NamedTuple):
 
 
 class MeasuredTool(NamedTuple):
-    """What is measured of an arm: the tip and what it exerts. World frame, axes of a tool."""
+    """Measurements of an arm: the tip and what it exerts. World frame, axes of a tool."""
 
     cp: CartesianPose
     """Pose of the tool: the origin is the tip, +z points out of it, +y is where the blade cuts."""
@@ -119,7 +119,7 @@ class CrtkArm:
 
     @property
     def measured(self) -> MeasuredTool:
-        """What was measured at the last tick."""
+        """Measurements at the last tick."""
         wrench = self._state.measured_cf
         return MeasuredTool(
             _tool(self._state.measured_cp), self._twist, -wrench.force, -wrench.torque

@@ -17,11 +17,11 @@ REFERENCE = "world"
 """Name of the frame in which poses are given: that of the run's world, z up."""
 
 _STATE_PERIOD = 0.1
-"""How often the operating state is published without a change [s]."""
+"""Interval at which the operating state is published without a change [s]."""
 
 _QUIET_PERIOD = 2.0
-"""How often at most a refusal is logged [s]: a stream of 1 kHz may be refused, as by the research
-kit."""
+"""Shortest interval at which a refusal is logged [s]: a stream of 1 kHz may be refused, as by the
+research kit."""
 
 _SAME = 30
 """Characters at the beginning of refusals by which they count as the same: numbers follow."""

@@ -12,7 +12,8 @@ UP = np.array([0.0, 0.0, 1.0])
 """Direction that points up in a picture."""
 
 N_FIT_STEPS = 4
-"""How often a view is scaled and moved to fit. Each time a tenth of the error is left."""
+"""Number of times that a view is scaled and moved to fit. Each time a tenth of the error is
+left."""
 
 
 class Margins(NamedTuple):

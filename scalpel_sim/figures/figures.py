@@ -83,7 +83,7 @@ class Drawn(NamedTuple):
     """Description of a figure that was drawn."""
 
     caption: str
-    """What the figure shows, in one line."""
+    """Content of the figure, in one line."""
     labels: list[str]
     """Label of each panel."""
     n_tetrahedra: list[int]

@@ -17,7 +17,7 @@ HIDDEN = 0.13
 _THICKNESS = 1.1
 """Thickness of the lines [pixels]."""
 _SLACK = 2e-3
-"""How much nearer a face must be to hide a line, as a fraction: lines lie on faces, which must not
+"""Fraction by which a face must be nearer to hide a line: lines lie on faces, which must not
 hide them."""
 
 

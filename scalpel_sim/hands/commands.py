@@ -147,10 +147,10 @@ class Begin(_Message, frozen=True, tag="begin"):
 
 
 LeadingCommand = Engage | Release | Move | Aim | Turn | StillThere | Choose | Jaws | End
-"""What the hand obeys in its next frame."""
+"""Commands that the hand obeys in its next frame."""
 
 RunCommand = Pause | Resume | Step | SlowMotion | Undo | Reset
-"""What is done between two frames."""
+"""Commands that are done between two frames."""
 
 Command = LeadingCommand | RunCommand | Begin | Lead
 

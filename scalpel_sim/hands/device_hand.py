@@ -29,7 +29,7 @@ MOST_HURRY = 5.0
 
 
 class DeviceAnswers(Protocol):
-    """What answers the device, beside the run."""
+    """Process that answers the device, beside the run."""
 
     def command(self) -> DeviceCommand:
         """Return what the device wants.
@@ -74,7 +74,7 @@ class DeviceHand(Teleoperation):
     ) -> None:
         super().__init__(simulation, seconds=seconds, clock=clock)
         self.answers: DeviceAnswers | None = None
-        """What answers the device; None: there is no device."""
+        """Process that answers the device; None: there is no device."""
         self._simulation, self._factor = simulation, factor
         self._watchdog, self._ends_with_client = watchdog, ends_with_client
         self._hold = self._n_lost = 0
@@ -90,7 +90,7 @@ class DeviceHand(Teleoperation):
 
     @property
     def stylus_distance(self) -> float:
-        """How far the stylus is from where the blade is led, since it took hold [m]."""
+        """Distance of the stylus from where the blade is led, since it took hold [m]."""
         if not self.is_engaged:
             return 0.0
         return math.dist(self._middle_asked.tolist(), self.blade.pose.middle.tolist())
@@ -129,7 +129,7 @@ class DeviceHand(Teleoperation):
         self._want(command.stylus)
 
     def tell(self) -> None:
-        """Tell what answers the device how the blade is after the last frame."""
+        """Report how the blade is after the last frame to what answers the device."""
         if self.answers is not None:
             self.answers.tell(self.report())
 

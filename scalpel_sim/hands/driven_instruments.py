@@ -69,7 +69,7 @@ class LiveInstrument(abc.ABC):
 
     @property
     def tip(self) -> FloatArray:
-        """What of it is led, in the world [m], shape (3,)."""
+        """Place of it that is led, in the world [m], shape (3,)."""
         return self._frame.points_to_world(np.array(self.numbers[:3]))
 
     @property
@@ -269,7 +269,7 @@ def _edge_of(at: Waypoint, name: str) -> BladeSegment:
 
 
 class PoseRecord:
-    """What a hand did, frame by frame. Of rows in turn that are the same, two are enough."""
+    """Record of a hand, frame by frame. Of rows in turn that are the same, two are enough."""
 
     def __init__(self) -> None:
         self._rows: list[list[float]] = []

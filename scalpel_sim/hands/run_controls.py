@@ -35,7 +35,7 @@ FRAMES_PER_STEP = 10
 """Frames of a step: a hundredth of a second, in which a blade that cuts goes half a millimetre."""
 
 SECONDS_ASLEEP = 0.01
-"""How often a run that stands still looks for commands [s]."""
+"""Interval at which a run that stands still looks for commands [s]."""
 
 MOST_STROKES = 50
 """Strokes that can be undone. Each keeps a state of the body in memory, some megabytes."""
@@ -44,7 +44,7 @@ SHORTEST_PAUSE = 5e-3
 """Shortest pause that slows a run to real time [s]: a shorter one costs more than it gains."""
 
 MOST_BEHIND = 0.05
-"""How far simulated time may fall behind and be caught up [s]. What is lost beyond is lost: a blade
+"""Delay of simulated time that is caught up, at most [s]. What is lost beyond is lost: a blade
 that is led by hand must not run ahead of the hand afterwards."""
 
 MEASURED_OVER = 0.5
@@ -89,7 +89,7 @@ class History:
 
     @property
     def n_strokes(self) -> int:
-        """How many strokes can be undone."""
+        """Number of strokes that can be undone."""
         return len(self._moments)
 
     def begin(self, *followers: Follower) -> None:
@@ -176,7 +176,7 @@ class Pace:
 
 
 class RunResults(NamedTuple):
-    """What a run has given, for its page."""
+    """Results of a run, for its page."""
 
     figures: Sequence[tuple[str, str]]
     """Labels and figures."""
@@ -218,7 +218,7 @@ class RunControls:
         self.notice = ""
         """Message of the page to the person."""
         self.results: RunResults | None = None
-        """What the run has given; None: it goes on."""
+        """Results of the run; None: it goes on."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
         self.on_wait: Callable[[], None] = lambda: None

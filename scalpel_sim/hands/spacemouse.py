@@ -11,7 +11,8 @@ import numpy as np
 from bridge import DeviceClient, DeviceState
 
 SPACEMOUSE_PERIOD = 4e-3
-"""How often a pose is sent [s]: twice as often as the mouse reports, motion and turning in turn."""
+"""Interval at which a pose is sent [s]: twice as often as the mouse reports, motion and turning in
+turn."""
 
 FULL_SPEED = 0.05
 """Speed of the tip at full deflection [m/s]: that of an unhurried incision."""

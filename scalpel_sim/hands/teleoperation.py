@@ -98,7 +98,7 @@ class Teleoperation(abc.ABC):
 
     @property
     def stylus_distance(self) -> float:
-        """How far the stylus of a device is from where the blade is led [m]; 0 without one."""
+        """Distance of the stylus of a device from where the blade is led [m]; 0 without one."""
         return 0.0
 
     @property

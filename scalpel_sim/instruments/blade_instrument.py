@@ -64,7 +64,7 @@ class BladeInstrument:
     def stroke(self, stroke: Stroke) -> None:
         self._stroke = stroke
         self.progress = StrokeProgress() if stroke.guards else None
-        """How far a stroke with guards has come; None of one that goes by the time alone."""
+        """Progress of a stroke with guards; None of one that goes by the time alone."""
         self.controller: Controller = StrokeFollower(self._hand, stroke, self._frame)
         """Leads the blade in each frame."""
         if self.progress is not None:

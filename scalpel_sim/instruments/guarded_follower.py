@@ -33,11 +33,11 @@ OVER, ENDED = "leading over", "ended"
 
 AS_PLANNED, THROUGH, STOPPED = "as planned", "through", "stopped at the limit of force"
 GAVE_UP, DREW_BACK = "gave up waiting at the limit of force", "drew back at the limit of force"
-"""How a stroke may end."""
+"""Ends that a stroke may have."""
 
 
 class StrokeEnd(NamedTuple):
-    """How one of the strokes in turn has ended."""
+    """End of one of the strokes in turn."""
 
     how: str
     """`AS_PLANNED`, or another of these."""
@@ -46,7 +46,7 @@ class StrokeEnd(NamedTuple):
 
 
 class StrokeProgress:
-    """How far strokes have come: all that a saved state must know of them."""
+    """Progress of strokes: all that a saved state must know of them."""
 
     def __init__(self) -> None:
         self.force = 0.0
@@ -64,7 +64,7 @@ class StrokeProgress:
         """Which of the strokes it is, or the next one."""
         self.has_begun = False
         self.waited = 0.0
-        """How much time it has lost [s]."""
+        """Time that it has lost [s]."""
         self.n_before = 0
         """Number of pieces before it, where that counts."""
         self.area_before = 0.0
@@ -74,7 +74,7 @@ class StrokeProgress:
         self.box: tuple[float, ...] = ()
         """Lowest and highest corner of the body when the blade was led over [m]."""
         self.ends: tuple[StrokeEnd, ...] = ()
-        """How strokes have ended so far."""
+        """Ends of strokes so far."""
 
     def enter(self, mode: str) -> None:
         """Begin a mode now."""
@@ -87,7 +87,7 @@ class StrokeProgress:
 
 
 class Sensed(Protocol):
-    """What the bridge knows of the tissue."""
+    """Facts that the bridge knows of the tissue."""
 
     @property
     def result(self) -> StepResult | None:
@@ -200,7 +200,7 @@ class GuardedFollower:
             self.progress.enter(mode)
 
     def _slow_down(self) -> None:
-        """Let the clock come to rest as at the end of a path: by half a cosine."""
+        """Bring the clock to rest as at the end of a path: by half a cosine."""
         progress, whole = self.progress, SPEED_UP_TIME
         share = min(progress.seconds / whole, 1.0)
         gone = 0.5 * whole * (share + math.sin(math.pi * share) / math.pi)
@@ -209,7 +209,7 @@ class GuardedFollower:
             progress.enter(RESTING)
 
     def _draw_back(self) -> None:
-        """Let the clock go back to where the stroke began."""
+        """Turn the clock back to where the stroke began."""
         progress = self.progress
         progress.at = max(progress.at_since - progress.seconds, self._guard.begin)
         if progress.at == self._guard.begin:

@@ -24,18 +24,18 @@ _PULLED, _LEFT = 80, 40
 """Steps of it in which the displacement is made smaller, and then, at most, in which it is not:
 bends that those make in the ways of the joints are undone."""
 _CLOSE: Final = 0.5
-"""How near each pose must be in it, see `Miss.size`."""
+"""Tolerance of each pose in it, see `Miss.size`."""
 _CUTOFF: Final = 1e-3
 """Singular value, over the largest, below which no motion in it is required of joints."""
 _FARTHER: Final = (0.0, 1e-3, 5e-3, 0.02, 0.05)
-"""How far beyond the border of reach poses are moved [m], one after the other: at the border, where
-an arm is stretched, the search for a configuration may end just next to it."""
+"""Distance by which poses beyond reach are moved into it [m], one after the other: at the border,
+where an arm is stretched, the search for a configuration may end just next to it."""
 _DECIMALS: Final = 4
 """Decimals of a place that a message gives [m]: a fifth of `NEAR_PLACE`."""
 
 
 class PlaceInScene(NamedTuple):
-    """How a scene says where the tissue lies from an arm, so that it can be corrected."""
+    """Words of a scene for where the tissue lies from an arm, so that it can be corrected."""
 
     table: str
     """The table of the scene whose `pos` that is."""

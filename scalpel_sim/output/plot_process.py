@@ -13,7 +13,8 @@ from scalpel_sim.errors import RunError
 from tissue.support import whole_file
 
 _TIMEOUT = 60.0
-"""How long a plot may take [s]. It takes a second, or ten when matplotlib first looks for fonts."""
+"""Time that a plot may take [s]. It takes a second, or ten when matplotlib first looks for
+fonts."""
 
 
 _PROGRAM = (

@@ -72,7 +72,7 @@ class RunOutcome:
     touched: dict[str, int] = field(default_factory=dict)
     """Number of frames in which each pair of parts collided."""
     stroke_ends: Sequence[StrokeEnd] = ()
-    """How each of the strokes in turn has ended, where a force or the body could end it."""
+    """Ends of the strokes in turn, where a force or the body could end it."""
     held_points: Sequence[int] = ()
     """Number of points that each attachment holds at the end."""
 
@@ -183,7 +183,7 @@ class RunOutcome:
 
     @cached_property
     def motion(self) -> tuple[float, float]:
-        """How far the body has moved [m] and turned [rad] as a rigid one: its largest piece."""
+        """Motion of the body [m] and its turn [rad] as a rigid one: its largest piece."""
         n, last = len(self.first.positions), self._last
         ends = np.stack([np.repeat(last.tetrahedra[:, 0], 3), last.tetrahedra[:, 1:].ravel()], 1)
         _, label = components(len(last.positions), ends)
@@ -199,7 +199,7 @@ class RunOutcome:
 
     @property
     def motion_of_supports(self) -> float:
-        """How far the fixed nodes have moved on average [m]; 0 where there are none."""
+        """Mean displacement of the fixed nodes [m]; 0 where there are none."""
         held = np.flatnonzero(self.first.fixed)
         if not len(held):
             return 0.0
@@ -208,7 +208,7 @@ class RunOutcome:
 
     @cached_property
     def forward_in_tissue(self) -> float:
-        """How far the edge went forward with tissue on it [m]."""
+        """Way of the edge forward with tissue on it [m]."""
         tips = self.frame.points_to_tissue(self.recording.vector("tip"))
         ahead = (np.diff(tips, axis=0) * self.forwards[1:]).sum(axis=1)
         is_in = self.recording.column("anchored_length_m")[1:] > 0.0
@@ -224,7 +224,7 @@ class RunOutcome:
 
     @property
     def distance_behind(self) -> float:
-        """How far the tip is from where it was to be at the end [m]."""
+        """Distance of the tip from where it was to be at the end [m]."""
         tip = np.array([self.recording.at_end(f"tip_{axis}_m") for axis in "xyz"])
         planned = self.stroke.pose(float(self.stroke_times[-1])).tip
         return float(np.linalg.norm(self.frame.points_to_tissue(tip) - planned))

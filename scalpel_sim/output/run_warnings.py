@@ -29,13 +29,13 @@ _FACE = 2.0
 of a cell of a grid."""
 
 _MOVED = 0.5
-"""How far a body, or a blade from its place, is moved before it is reported, in node sizes."""
+"""Motion of a body, or of a blade from its place, from which it is reported, in node sizes."""
 
 _TURNED = math.radians(2.0)
 """By how much a body has turned before it is reported [rad]."""
 
 _GIVEN_WAY = 5e-3
-"""How much farther than it cut the edge went in the tissue before it is reported [m]: any edge
+"""Excess of the edge's way in the tissue over what it cut from which it is reported [m]: any edge
 drags tissue along by a few millimetres."""
 
 _MM, _MM2 = 1e3, 1e6

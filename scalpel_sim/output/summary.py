@@ -65,8 +65,8 @@ class Summary(NamedTuple):
     each_piece: list[dict[str, Any]]
     """Mass properties of the pieces (`tissue.Piece`), the largest first."""
     quality: dict[str, float] | None
-    """How closely the cut follows the blade, and what it did to the mesh; None where the link was
-    lost."""
+    """Quality of the cut: how closely it follows the blade, and what it did to the mesh; None where
+    the link was lost."""
     cut_area_m2: float
     asked_area_m2: float | None
     """The area that the stroke was to cut, in the body at rest; None where that is not known."""
@@ -80,7 +80,7 @@ class Summary(NamedTuple):
     force_mean_n: float
     """Mean magnitude of the force on the blade over the frames in which there was any."""
     strokes: list[dict[str, Any]]
-    """How each stroke has ended, and when, where a force or the body could end it: `kind`, `ended`,
+    """End of each stroke, and its time, where a force or the body could end it: `kind`, `ended`,
     `time_s`, `force_n`."""
     attachments: list[dict[str, Any]]
     """Of each attachment: what it held, how many points in the end, and its forces."""
@@ -92,7 +92,7 @@ class Summary(NamedTuple):
     """The residual over the work of all hands: of the blade, and the most that loads and graspers
     had done. None without an audit, or without work."""
     hands: list[dict[str, Any]]
-    """What each grasper felt: see `hand_figures`."""
+    """Figures of what each grasper felt: see `hand_figures`."""
     share: dict[str, float]
     """Fractions of `wall_seconds`: the paper's RX, RD, GC, CD, and `other` (arm, bridge, link,
     recording). They sum to 1."""

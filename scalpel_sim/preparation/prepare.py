@@ -33,7 +33,7 @@ from tissue import TetrahedralMesh
 _log = logging.getLogger("scalpel_sim")
 
 _ON_TABLE = 1e-9
-"""How far below a table an edge may be that ends on it [m]: that is rounding, and no warning."""
+"""Depth below a table of an edge that ends on it, at most [m]: that is rounding, and no warning."""
 
 
 def prepare(

@@ -30,7 +30,8 @@ from tissue import (
 _log = logging.getLogger("scalpel_sim")
 
 LONG_DRAG = 0.1
-"""How far a blade may drag the tissue without a warning, as a share of the body's median extent."""
+"""Distance to which a blade may drag the tissue without a warning, as a share of the body's median
+extent."""
 
 MOST_INVERTED = 0.0
 """Share of tetrahedra that may be inside out after settling without a warning."""
@@ -43,7 +44,7 @@ _HARDLY_COMPRESSIBLE = 0.45
 """Poisson's ratio that most presets have [1]."""
 
 TABLE_MARGIN = 0.08
-"""How far a table reaches beyond the body [m]: as far as pieces are put down next to it."""
+"""Width of a table beyond the body [m]: as far as pieces are put down next to it."""
 
 TABLE_HALF_THICKNESS = 0.005
 """Half the thickness of a table [m]: what is pressed on it is never nearer to the other side."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 _BYTES_PER_READ = 1 << 20
-"""How much of a file is read at once [bytes]."""
+"""Length of what is read of a file at once [bytes]."""
 
 
 class FileSum(NamedTuple):

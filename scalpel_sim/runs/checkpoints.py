@@ -43,7 +43,7 @@ class RunPlan(
 class RunMark(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="note", tag="mark"
 ):
-    """How far a run had got."""
+    """Progress of a run."""
 
     n_frames: int
     """Number of frames that were done."""
@@ -112,7 +112,7 @@ class Checkpoint(NamedTuple):
     plan: RunPlan
     """Request of the run."""
     mark: RunMark
-    """How far it had got."""
+    """Progress of it."""
     state: bytes
     """See `SimulationState.to_bytes`."""
 

@@ -9,7 +9,7 @@ FINAL = "final.vtu"
 REPLAY = "replay.html"
 SCENE = "scene.toml"
 STROKE = "stroke.csv"
-"""What a hand did with the blade. A scripted run leaves it, and the files of graspers: they may be
+"""Motion of the blade in a hand. A scripted run leaves it, and the files of graspers: they may be
 the very ones that are done again."""
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 """Names of all files that a run can write, besides `STROKE`."""

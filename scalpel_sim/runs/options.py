@@ -63,7 +63,7 @@ class DeviceOptions:
     watchdog: float | None = None
     "The blade rests when no pose has come for so long, in wall time [s; default: 0.04]."
     client_stops: Literal["hold", "end"] | None = None
-    """What a device that falls silent, or disconnects, does to the run: hold [default], the blade
+    """Effect on the run of a device that falls silent, or disconnects: hold [default], the blade
     rests until a device comes again; or end, the run ends."""
 
 

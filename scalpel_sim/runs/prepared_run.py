@@ -19,7 +19,7 @@ class PreparedRun(NamedTuple):
     simulation: Simulation
     """At its start."""
     scene: Scene
-    """What it was made from. Of a tissue elsewhere it says only what the server describes."""
+    """Scene that it was made from. Of a tissue elsewhere it says only what the server describes."""
     folder: Path
     """Folder of its files."""
     settings: dict[str, Any]
@@ -33,7 +33,7 @@ class PreparedRun(NamedTuple):
     is_here: bool = True
     """Whether the tissue is in this process."""
     printing: PrintOptions = PrintOptions()
-    """What is printed meanwhile."""
+    """Printing meanwhile."""
 
 
 def load_kernels(options: PrintOptions, scene: Scene | None = None) -> None:

@@ -40,7 +40,7 @@ class Resumption(NamedTuple):
     plan: RunPlan | None
     """Request of the run; None: no note of it is whole."""
     last: RunMark | None
-    """How far it had got by the last note."""
+    """Progress by the last note."""
     recorded: Recording
     """The rows of `forces.csv`."""
     forces: FileSum
@@ -57,12 +57,12 @@ class Resumption(NamedTuple):
 
     @property
     def seconds(self) -> float | None:
-        """How long the run is to last [s]; None: as its scene says, or what a hand did."""
+        """Time that the run is to last [s]; None: as its scene says, or what a hand did."""
         return None if self.plan is None else self.plan.seconds
 
     @property
     def replay(self) -> FileSum:
-        """How far the frames of the replay had got."""
+        """Progress of the frames of the replay."""
         checkpoint = self.checkpoint
         return FileSum() if checkpoint is None else checkpoint.mark.written[REPLAY_FRAMES]
 

@@ -33,13 +33,14 @@ from scalpel_sim.viewer.replay import ReplayWriter
 _log = logging.getLogger(__name__)
 
 REST_AFTER_STROKE = 0.3
-"""How long a run continues after the stroke's end [s]: the tissue swings out, and the cut gapes."""
+"""Time for which a run continues after the stroke's end [s]: the tissue swings out, and the cut
+gapes."""
 
 ENDED_IN_PAGE = "ended in the page"
 """The status of a run of a script that somebody has ended in the live page."""
 
 LONGEST_WAIT = 2.0
-"""How long a run that is to end waits for a tissue in another process [s]."""
+"""Time for which a run that is to end waits for a tissue in another process [s]."""
 
 
 class RunCheckpoints(Checkpoints):

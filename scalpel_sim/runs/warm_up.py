@@ -50,7 +50,7 @@ _DT = 1e-3
 _SECONDS_PER_CHECK = 0.1
 """Time between two checks of the progress of the processes [s]."""
 USUAL_NUMBER = 1000
-"""How many kernels a set has, about."""
+"""Number of kernels in a set, about."""
 _ADDED = {
     "scheme": 44,
     "relaxation": 18,
@@ -59,7 +59,7 @@ _ADDED = {
     "is_held": 11,
     "has_table": 27,
 }
-"""How many of them, about, a set does not have which differs in one field; other fields add none,
+"""Number of them, about, that a set lacks which differs in one field; other fields add none,
 or only programs made of the same ones."""
 
 Progress = Callable[[int, int], None]

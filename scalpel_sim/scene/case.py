@@ -31,7 +31,7 @@ from scalpel_sim.tables.values import (
 )
 
 TIME = "time"
-"""What a record may be compared against, besides another record."""
+"""References of a record, besides another record."""
 
 _HOW_TO_BEGIN = "docs/scenes.md#cases describes case files, and docs/examples has two to start from"
 
@@ -51,7 +51,7 @@ class RunTable(TomlTable, kw_only=True, frozen=True):
     """`[run]`: how long, and with which method."""
 
     seconds: Positive
-    """How long to simulate [s]."""
+    """Time to simulate [s]."""
     dt: Positive = 1e-3
     """Time step [s]."""
     record_every: Positive = 1e-2
@@ -61,7 +61,7 @@ class RunTable(TomlTable, kw_only=True, frozen=True):
     settle: TrueOrFalse = False
     """Whether the body first comes to rest under gravity and the loads of time 0."""
     relaxation: _Relaxation = "global"
-    """How the motion is advanced: global or verlet."""
+    """Method that advances the motion: global or verlet."""
 
 
 class SupportTable(TomlTable, kw_only=True, frozen=True):
@@ -74,7 +74,7 @@ class SupportTable(TomlTable, kw_only=True, frozen=True):
     times: Times | None = None
     """Times of the rows of `displacement` [s]."""
     displacement: RowsOfThree | None = None
-    """How far it is moved, a row for each time [m]."""
+    """Displacement, a row for each time [m]."""
 
 
 class LoadTable(TomlTable, kw_only=True, frozen=True):
@@ -134,7 +134,7 @@ class ExpectedTable(TomlTable, kw_only=True, frozen=True):
     file: FileName | None = None
     """CSV file of a curve: a line of names and two columns, the first ascending."""
     against: Name = TIME
-    """What a curve is over: time, or another record."""
+    """Abscissa of a curve: time, or another record."""
     value: Finite | None = None
     """Value of the mean of the record from `from_time` to `to_time`, in place of a curve."""
     from_time: NotNegative = 0.0
@@ -153,17 +153,17 @@ class CaseContent(TomlTable, kw_only=True, frozen=True):
     material: PresetMaterialTable
     """The material."""
     run: RunTable
-    """How long, and with which method."""
+    """Duration, and method."""
     support: list[SupportTable] = field(default_factory=list)
-    """What holds the body."""
+    """Supports of the body."""
     load: list[LoadTable] = field(default_factory=list)
-    """What pushes it."""
+    """Loads on it."""
     blade: CaseBladeTable | None = None
-    """What cuts it."""
+    """Cuts through it."""
     record: Annotated[list[RecordTable], Meta(min_length=1)]
-    """What is recorded."""
+    """Records of it."""
     expected: list[ExpectedTable] = field(default_factory=list)
-    """What the records should be."""
+    """Values that the records should have."""
 
 
 def is_case(path: Path) -> bool:

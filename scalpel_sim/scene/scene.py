@@ -48,7 +48,7 @@ the tissue along before it parts. That must be small against the body, or the bl
 along instead of cutting it."""
 
 Made = TypeVar("Made")
-"""What `naming_table` returns."""
+"""Type that `naming_table` returns."""
 
 
 class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
@@ -65,7 +65,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     about: Text = ""
     """A description in one line."""
     seconds: Positive | None = None
-    """How long to simulate [s; default: the strokes and 0.3 s more]."""
+    """Time to simulate [s; default: the strokes and 0.3 s more]."""
     body: HeldBodyTable
     """The geometry, and how it is held."""
     material_table: PresetMaterialTable | None = field(default=None, name="material")
@@ -73,19 +73,19 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     blade_table: BladeTable = field(default_factory=BladeTable, name="blade")
     """The blade; a scalpel without."""
     world: WorldTable = field(default_factory=WorldTable)
-    """What is around the body."""
+    """Surroundings of the body."""
     solver: SolverTable = field(default_factory=SolverTable)
-    """How the mesh is cut, and how the motion is computed."""
+    """Methods that cut the mesh and compute the motion."""
     arm: ArmTable = field(default_factory=ArmTable)
     """The arm, and how it is coupled to the tissue."""
     attachments: tuple[AttachmentTable, ...] = field(default=(), name="attachment")
-    """What holds the tissue besides the fixed nodes."""
+    """Attachments that hold the tissue besides the fixed nodes."""
     supports: tuple[LedSupportTable, ...] = field(default=(), name="support")
     """Held sides that move."""
     graspers: tuple[GrasperTable, ...] = field(default=(), name="grasper")
     """Other arms, each with a grasper, and what they do."""
     strokes: tuple[StrokeTable, ...] = field(default=(StrokeTable(),), name="stroke")
-    """What is done with the blade, in turn."""
+    """Strokes of the blade, in turn."""
     views: tuple[ViewTable, ...] = field(default=(), name="view")
     """Where pages and pictures show it from, the first of them at the start."""
 
@@ -118,7 +118,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
 
     @cached_property
     def cut(self) -> CutSettings:
-        """How closely cuts follow the blade, against how small the elements get."""
+        """Settings that weigh how closely cuts follow the blade against small elements."""
         given = self.solver
         floor = given.snap if given.snap_floor is None else given.snap_floor
         settings = {"snap": given.snap, "floor": floor, "guard": given.guard, "crumb": given.crumb}

@@ -56,8 +56,9 @@ class MaterialTable(TomlTable, kw_only=True, frozen=True):
     """`[material]`: the figures of `tissue.Material`."""
 
     law: LawName | None = None
-    """How forces follow from deformation: springs along the edges of the mesh, as in the paper, or
-    tetrahedra: neo_hookean, or exponential or yeoh, which stiffen as they are stretched."""
+    """Law by which forces follow from deformation: springs along the edges of the mesh, as in the
+    paper, or tetrahedra: neo_hookean, or exponential or yeoh, which stiffen as they are
+    stretched."""
     young_modulus: Positive | None = None
     """Young's modulus, the stiffness at small strain [Pa]."""
     poisson_ratio: Ratio | None = None
@@ -162,17 +163,17 @@ class SolverTable(TomlTable, kw_only=True, frozen=True):
     """`[solver]`: how the mesh is cut, and how the motion is computed."""
 
     scheme: Text = "stellar"
-    """How the mesh is cut: stellar, or paper: the paper's own scheme, with its limits."""
+    """Scheme that cuts the mesh: stellar, or paper: the paper's own scheme, with its limits."""
     relaxation: Text = "global"
-    """How the motion is advanced: global, all nodes together by the Runge-Kutta method [default of
-    run]; verlet, the same by a method of second order, up to 1.5 times as fast [default of
-    view]; or, for springs, hierarchical, near the blade more often, or paper, the same as
+    """Method that advances the motion: global, all nodes together by the Runge-Kutta method
+    [default of run]; verlet, the same by a method of second order, up to 1.5 times as fast [default
+    of view]; or, for springs, hierarchical, near the blade more often, or paper, the same as
     printed: far from the blade nothing moves."""
     mass_scaling: NotNegative = DEFAULT_MASS_SCALING
     """Light nodes, of slivers or near the blade, get mass until none is faster than this angular
     frequency [1/s; 0: off]. The added mass has no weight, and the table says how much it is."""
     element: Text = "averaged"
-    """How tetrahedra are strained: averaged, a share of their shear around nodes, so that coarse
+    """Strain of tetrahedra: averaged, a share of their shear around nodes, so that coarse
     meshes bend and twist as a solid; or plain, each by itself: faster, and stiffer by a third where
     two or three are across."""
     precision: Text = "single"
@@ -225,7 +226,7 @@ class ArmTable(TomlTable, kw_only=True, frozen=True):
     """Query the tissue once in so many milliseconds; in between the arm feels its last answer and
     its local stiffness."""
     coupling: Text = "rigid"
-    """How the arm's blade is coupled to the one that cuts: rigid, they are one; or virtual, by a
+    """Coupling of the arm's blade to the one that cuts: rigid, they are one; or virtual, by a
     spring and a damper, and the arm feels nothing stiffer."""
     coupling_stiffness: Positive | None = None
     """Stiffness of a virtual coupling [N/m; default: 700]."""
@@ -257,7 +258,7 @@ class AttachmentTable(TomlTable, kw_only=True, frozen=True):
     toughness: Positive | None = None
     """Energy of cutting the fibres [J/m2]."""
     displacements: RowsOfThree | None = None
-    """How far the frame, or the other ends of a ligament, are moved from where they are at first,
+    """Displacement of the frame, or the other ends of a ligament, from where they are at first,
     row by row [m]."""
     times: Times | None = None
     """When the frame is there, a time for each row [s]."""
@@ -276,12 +277,12 @@ class LedSupportTable(TomlTable, kw_only=True, frozen=True):
     """When they are at each row, after the start, above 0 [s]. From row to row all changes evenly;
     after the last they stay."""
     displacements: RowsOfThree | None = None
-    """How far they are moved from where they are at first, row by row [m]."""
+    """Displacement from where they are at first, row by row [m]."""
     rotations_degrees: RowsOfThree | None = None
     """By how much they are turned, row by row: vectors along the axis and as long as the angle
     [degree]."""
     stretches: RowsOfThree | None = None
-    """How many times as long they are along x, y and z, before they are turned, row by row."""
+    """Factors of their lengths along x, y and z, before they are turned, row by row."""
     about: ThreeNumbers | None = None
     """Point about which they are turned and stretched [m]; the middle of the region without."""
 
@@ -323,8 +324,8 @@ class GrasperTable(TomlTable, kw_only=True, frozen=True):
     holds: Annotated[Literal["attachment", "friction"], one_of("attachment", "friction")] = (
         "attachment"
     )
-    """How tissue is held: by attachment, what is between the pads when they have closed is tied to
-    the grasper by springs; or by friction, shaft, jaws and pads touch the tissue, and friction
+    """Kind of hold on tissue: by attachment, what is between the pads when they have closed is tied
+    to the grasper by springs; or by friction, shaft, jaws and pads touch the tissue, and friction
     (0.6) holds it."""
     stiffness: Positive | None = None
     """Stiffness of the attachment [N/m]; 2000 without."""

@@ -33,7 +33,7 @@ _SHEET_POSES = 200
 """Poses of a stroke between which its sheet is flat: 0.5 mm of an organ each."""
 
 _REACH = 0.1
-"""How far the sheet reaches beyond the ends of the edge, in node sizes: an edge that ends as near
+"""Length of the sheet beyond the ends of the edge, in node sizes: an edge that ends as near
 to the skin, or glides on a table, cuts through it, for a cut goes through nodes that are near."""
 
 _ASIDE = np.array((0.61, 0.53, 0.59)) * 1e-3

@@ -20,7 +20,7 @@ KEYS_OF_PATH = (
 _UP = (0.0, 0.0, 1.0)
 
 _TURN_RATE = 2.0 * math.pi
-"""How fast the blade turns about its tip where a path has a corner [rad/s]: half a second for a
+"""Rate at which the blade turns about its tip at a corner of a path [rad/s]: half a second for a
 right angle and a ramp would be slow, a tenth would throw the tissue about."""
 
 _PER_SAW = 40

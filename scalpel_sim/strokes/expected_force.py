@@ -1,4 +1,4 @@
-"""How hard a stroke will be: toughness times the width of cut that is open at once."""
+"""Force that a stroke will need: toughness times the width of cut that is open at once."""
 
 import itertools
 from typing import NamedTuple
@@ -19,7 +19,7 @@ _DIGITS = 12
 
 
 class ExpectedForce(NamedTuple):
-    """What a blade meets where the cut is widest, if the body does not give way."""
+    """Force that a blade meets where the cut is widest, if the body does not give way."""
 
     force: float
     """Force along the motion [N]."""

@@ -12,13 +12,13 @@ class Guard(NamedTuple):
     end: float
     """When it ends at the latest: where it has gone as far as it may."""
     pause: float = 0.0
-    """How long the blade rests afterwards [s]."""
+    """Time for which the blade rests afterwards [s]."""
     force_limit: float = math.inf
     """Force on the blade at which something is done [N]."""
     at_limit: str = "stop"
-    """What is done then: see `StrokeTable.at_limit`."""
+    """Action at the limit: see `StrokeTable.at_limit`."""
     patience: float = 0.0
-    """How much time it may lose by waiting before it stops [s]."""
+    """Time that it may lose by waiting before it stops [s]."""
     is_until_through: bool = False
     """Whether it ends as soon as the body is parted."""
 
@@ -28,7 +28,7 @@ class Guard(NamedTuple):
 
     @property
     def longest_delay(self) -> float:
-        """How much longer than planned it may take by itself [s], ways through the air excluded."""
+        """Time that it may take beyond its plan by itself [s], ways through the air excluded."""
         if self.force_limit == math.inf:
             return 0.0
         return {"wait": self.patience, "draw back": self.end - self.begin}.get(self.at_limit, 0.0)

@@ -26,10 +26,10 @@ DEFAULT_SPEED = 0.06
 
 
 DEFAULT_AT_MOST = 0.03
-"""How much farther than planned a stroke goes that is to part the body [m]."""
+"""Distance beyond what was planned of a stroke that is to part the body [m]."""
 
 DEFAULT_PATIENCE = 2.0
-"""How long a stroke waits at its limit of force [s]: most tissue that relaxes has done so."""
+"""Time for which a stroke waits at its limit of force [s]: most tissue that relaxes has done so."""
 
 UNTIL_THROUGH = ("until", "at_most")
 """Keys of strokes that can part a body."""
@@ -46,8 +46,8 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     speed: Positive | None = None
     """Speed of the tip between its ramps [m/s]; 0.06 without."""
     depth: Positive | None = None
-    """How deep it goes [m]; without, an incision goes 0.008 deep, and a press half as deep as would
-    cut."""
+    """Depth to which it goes [m]; without, an incision goes 0.008 deep, and a press half as deep as
+    would cut."""
     along: TwoShares | None = None
     """Where an incision goes in and out, as shares of the body's length; [0.2, 0.73] without. In
     the other order it is drawn backwards."""
@@ -62,31 +62,31 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     slicing_ratio: Finite | None = None
     """Speed along the edge, towards the heel, over that across it."""
     saw_amplitude: Positive | None = None
-    """How far the blade is moved along the edge, back and forth [m]."""
+    """Distance by which the blade is moved along the edge, back and forth [m]."""
     saw_frequency: Positive | None = None
-    """How often the blade is moved back and forth [1/s]."""
+    """Frequency at which the blade is moved back and forth [1/s]."""
     file: FileName | None = None
     """CSV file of poses."""
     wait: NotNegative = 0.0
-    """How long the blade rests before it begins [s]."""
+    """Time for which the blade rests before it begins [s]."""
     pause: NotNegative = 0.0
-    """How long the blade rests afterwards [s]."""
+    """Time for which the blade rests afterwards [s]."""
     force_limit: Positive | None = None
     """Force on the blade that it does not go on against [N]; any without."""
     at_limit: AtLimit | None = None
-    """What it does there: stop, with all that was to come; wait: from 80 % of the limit on it goes
-    slower, and stands while the force is above it; or draw back the way it came, and go to the next
-    stroke. stop without."""
+    """Action at that limit: stop, with all that was to come; wait: from 80 % of the limit on it
+    goes slower, and stands while the force is above it; or draw back the way it came, and go to the
+    next stroke. stop without."""
     patience: Positive | None = None
-    """How much time it may lose by waiting before it stops [s]; 2 without."""
+    """Time that it may lose by waiting before it stops [s]; 2 without."""
     until: Until | None = None
     """through: it ends when the body is parted, before or after where it was to end."""
     at_most: Positive | None = None
-    """How much farther than planned it then goes at most [m]; 0.03 without."""
+    """Distance beyond what was planned that it then goes at most [m]; 0.03 without."""
 
     @property
     def farther(self) -> float:
-        """How much farther than planned it may go [m]."""
+        """Distance beyond what was planned that it may go [m]."""
         if self.until is None:
             return 0.0
         return DEFAULT_AT_MOST if self.at_most is None else self.at_most

@@ -15,13 +15,14 @@ from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
 from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
 
 WIDEST = 0.3
-"""How far a sheet may stray from its middle towards the held sides, as a fraction of the body's
-width. Beyond 0.4 it would come near what is held, and cut that off instead of the body in two."""
+"""Distance by which a sheet may stray from its middle to the held sides, as a fraction of the
+body's width. Beyond 0.4 it would come near what is held, and cut that off instead of the body in
+two."""
 
 SHIFTS = (0.0, 0.04, -0.04, 0.08, -0.08, 0.12, -0.12, 0.16, -0.16, 0.2, -0.2)
-"""How far from the middle a sheet may lie, as a fraction of the body's width: where a bent or
-branched body falls into more than two parts at the middle, the nearest place is taken where it
-does not."""
+"""Distance from the middle at which a sheet may lie, as a fraction of the body's width: where a
+bent or branched body falls into more than two parts at the middle, the nearest place is taken where
+it does not."""
 
 _HELD = 0.06
 """Fraction of the body's width at each end that a sheet must leave whole: the held sides are there
@@ -35,12 +36,12 @@ _BLADE_MARGIN, BLADE_MARGIN_SHARE = 5e-3, 0.3
 Tissue sags, stretches, and is dragged along; a blade that it slips off leaves a bridge."""
 
 _GAP, GAP_SHARE = 5e-3, 0.1
-"""How far before the body the blade starts: [m], plus a share of the section's length."""
+"""Distance before the body at which the blade starts: [m], plus a share of the section's length."""
 
 OVERSHOOT, OVERSHOOT_SHARE = 15e-3, 0.4
-"""How far beyond the body the stroke ends: [m], or a share of the section's length where that is
-more, and in either case the body's displacement. The last of the tissue is dragged along before it
-parts."""
+"""Distance beyond the body at which the stroke ends: [m], or a share of the section's length where
+that is more, and in either case the body's displacement. The last of the tissue is dragged along
+before it parts."""
 
 LARGEST_DISPLACEMENT = 0.5
 """Largest displacement of a body before the blade, as a fraction of half its width: beyond that it
@@ -91,7 +92,7 @@ class Passage(NamedTuple):
     depths: tuple[float, float]
     """Smallest and largest depth of the body along the edge [m]."""
     displacement: float
-    """How far the blade displaces the body before it cuts [m], roughly."""
+    """Distance by which the blade displaces the body before it cuts [m], roughly."""
     beyond: float
     """Travel at which a stroke ends that goes through [m]."""
 

@@ -14,7 +14,7 @@ _SPEED = 0.1
 """Speed of the middle of the blade through the air [m/s]."""
 
 _CLEARANCE = 5e-3
-"""How far from the body the blade stays on its way [m]: tissue that was cut may stand out."""
+"""Distance from the body that the blade keeps on its way [m]: tissue that was cut may stand out."""
 
 _ROUNDING = 1e-6
 """Share by which a blade may be shorter than a stroke needs: rounding of a file's digits."""

@@ -59,7 +59,7 @@ class Stroke:
     ) -> None:
         self.name = name
         self.guards = tuple(guards)
-        """What may end each of the strokes in turn otherwise; none where nothing may."""
+        """Guards that may end each of the strokes in turn; none where there are none."""
         self.is_led = is_led
         """Whether a person leads it, or has led it: the arm then stands where it reaches all
         around the body, wherever that stroke goes."""
@@ -99,7 +99,7 @@ class Stroke:
 
     @property
     def duration(self) -> float:
-        """How long the stroke takes [s]."""
+        """Time that the stroke takes [s]."""
         return float(self.times[-1])
 
     def pose(self, t: float) -> BladeSegment:
@@ -159,7 +159,7 @@ def from_csv(path: str | Path) -> Stroke:
 
 
 class _PoseError(StrokeError):
-    """What is wrong with one pose, so that a reader can name its line."""
+    """Fault of one pose, so that a reader can name its line."""
 
     def __init__(self, pose: int, problem: str) -> None:
         super().__init__(f"pose {pose} of the stroke: {problem}")

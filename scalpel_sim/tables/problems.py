@@ -26,7 +26,7 @@ class Problem(NamedTuple):
     """A key or a value that is wrong."""
 
     text: str
-    """What is wrong, where, and what may stand there."""
+    """Fault, its place, and what may stand there."""
     key: tuple[str, ...]
     """Parts of the key; rows are counted from 0."""
 

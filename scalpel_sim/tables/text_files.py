@@ -12,7 +12,7 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.tables.problems import problem_of
 
 SUFFIX = ".toml"
-"""What the names of such files end in."""
+"""End of the names of such files."""
 
 LARGEST_FILE = 1 << 22
 """Largest file [byte]: those that people write have some thousand."""

@@ -1,4 +1,4 @@
-"""What a key of a TOML file may hold. SI units, tissue frame.
+"""Values that a key of a TOML file may hold. SI units, tissue frame.
 
 The description of each is what an error says the value must be.
 """
@@ -31,7 +31,7 @@ class Kind(NamedTuple):
     """A kind of a table, and its keys. Keys of no kind belong to all."""
 
     about: str = ""
-    """What it is, or does."""
+    """Nature or effect of it."""
     needed: tuple[str, ...] = ()
     """Keys that it must have."""
     possible: tuple[str, ...] = ()

@@ -31,7 +31,7 @@ _N_ELEMENTS = 100
 
 
 class BeamTheory(NamedTuple):
-    """What Timoshenko's beam does."""
+    """Behaviour of Timoshenko's beam."""
 
     sag_of_weight: float
     """Deflection of the tip of the clamped beam under its own weight [m]."""

@@ -49,7 +49,7 @@ _STEPS_IN_PERIOD = 50
 
 
 class FreeBar(NamedTuple):
-    """What the bar without supports does on one mesh."""
+    """Behaviour of the bar without supports on one mesh."""
 
     across: int
     """Cells through its thickness."""
@@ -60,7 +60,7 @@ class FreeBar(NamedTuple):
 
 
 class BarMotion(NamedTuple):
-    """What the bar does."""
+    """Behaviour of the bar."""
 
     sag_of_weight: float
     """Deflection of the tip under its own weight [m]."""

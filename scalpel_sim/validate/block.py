@@ -33,7 +33,7 @@ COARSE_CELLS, FINE_CELLS = (8, 8, 4), (12, 12, 6)
 DT = 1e-3
 """Time step [s]: that of a haptic loop."""
 _BELOW = 0.005
-"""How far the tip of an edge that cuts right through is below the block [m]."""
+"""Depth below the block of the tip of an edge that cuts right through [m]."""
 _EDGE_LENGTH = 0.03
 """Length of an edge that cuts right through [m]."""
 STEADY_RANGE = (0.3 * LENGTH, 0.75 * LENGTH)
@@ -149,7 +149,7 @@ def straight_cut(
 
 
 class StrokeRecord(NamedTuple):
-    """What the blade met on a stroke, a row for each step."""
+    """Forces that the blade met on a stroke, a row for each step."""
 
     tip: FloatArray
     """Position of the tip at the end of the step [m], shape (n, 3)."""

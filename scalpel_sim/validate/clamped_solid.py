@@ -39,7 +39,7 @@ AxisMatrices = dict[tuple[bool, bool], csr_array]
 
 
 class ClampedSolid(NamedTuple):
-    """What the clamped bar does by linear elasticity."""
+    """Behaviour of the clamped bar by linear elasticity."""
 
     sag_of_weight: float
     """Deflection of the tip under its own weight [m]."""

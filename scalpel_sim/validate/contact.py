@@ -12,7 +12,7 @@ from tissue import FloatArray, Geom, Material, TetrahedralMesh, Tissue, block
 
 _LINES = lines_of("contact")
 _DEPTHS = [0.5e-3, 1e-3, 1.5e-3, 2e-3]
-"""How deep the sphere is pressed [m]."""
+"""Depth to which the sphere is pressed [m]."""
 _POISSON = (0.3, 0.45)
 """Poisson's ratios of the half-space."""
 _COARSE, _FINE = 1.2e-3, 0.8e-3
@@ -22,9 +22,9 @@ _FRICTIONS = (0.2, 0.5, 1.0)
 _BLOCK, _CELLS = (0.04, 0.03, 0.01), (4, 3, 2)
 """Sides of the block [m], flat, so that it presses on the table all over; and its cells."""
 _RATE = 3.0
-"""How fast the table tilts [degrees/s]."""
+"""Rate at which the table tilts [degrees/s]."""
 _HELD, _SLID = 3e-5, 3e-4
-"""How far the foot of the block has slid at most while it holds, and at least when it slips [m].
+"""Way that the foot of the block has slid at most while it holds, and at least when it slips [m].
 Some of it slides before the rest: the pressure is largest at its front. From the one to the other
 a block that slips takes 0.1 s."""
 _DT = 1e-3
@@ -34,10 +34,11 @@ RADIUS = 0.01
 YOUNG = 20e3
 """Young's modulus [Pa]; the force is proportional to it."""
 _REACH = 0.12
-"""How far the half-space reaches sideways and down, at least [m]: 27 times the radius of the
+"""Reach of the half-space sideways and down, at least [m]: 27 times the radius of the
 contact at a depth of 2 mm. Where it is twice as large the force is 0.6 to 1.2 % less."""
 _FINE_REACH = 0.0048
-"""How far cells are small around the contact [m]: more than its radius at 2 mm, 4.5 mm."""
+"""Distance around the contact within which cells are small [m]: more than its radius at 2 mm, 4.5
+mm."""
 _GROWTH = 1.4
 """Growth of the cells from there on."""
 _FRAMES, _PRESS_DT = 10, 2e-3
@@ -50,7 +51,7 @@ class Indentation(NamedTuple):
     n_tetrahedra: int
     """Size of the mesh."""
     depth: FloatArray
-    """How deep it was [m]."""
+    """Depth of it [m]."""
     force: FloatArray
     """Force on it [N]."""
 

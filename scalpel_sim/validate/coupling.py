@@ -17,13 +17,13 @@ _LINES = lines_of("coupling")
 _LEAST_SHARE = 0.05
 """Share of all energy put in from which on the share that came back is looked at."""
 _AFTERWARDS = 0.2
-"""How long the hand holds, releases, or taps after the press [s]."""
+"""Time for which the hand holds, releases, or taps after the press [s]."""
 _TAP_DISTANCE = 6e-3
-"""How far a tap withdraws the blade [m]."""
+"""Distance by which a tap withdraws the blade [m]."""
 _TAP_RATE = 10.0
 """Taps per second [Hz]."""
 _HANDS = ("holds", "releases", "taps")
-"""What the hand does after the press."""
+"""Action of the hand after the press."""
 _PRESS = changed(
     SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, preset="touch", speed=0.2
 )

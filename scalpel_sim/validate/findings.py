@@ -1,4 +1,4 @@
-"""What a scene of the validation returns: checks with their bounds, plots, and references."""
+"""Findings of a scene of the validation: checks with their bounds, plots, and references."""
 
 import math
 import tomllib
@@ -21,14 +21,15 @@ THEORY: Basis = "theory"
 PUBLISHED: Basis = "published"
 REGRESSION: Basis = "regression"
 CASE: Basis = "case"
-"""What a check compares with. `theory`: a formula or a law of conservation that is independent of
+"""Reference of a check. `theory`: a formula or a law of conservation that is independent of
 how the engine computes the value. `published`: a figure of an experiment. `regression`: what was
 put in, as the engine's own law of it says: it shows that the engine does what it is told, and not
 that tissue does so. `case`: what the file of a case expects."""
 
 _SECTIONS = Path(__file__).with_name("sections.toml")
 LARGEST_KNOWN = 0.02
-"""How far the second bounds of a known deviation may be from what was measured, as a share."""
+"""Distance of the second bounds of a known deviation from what was measured, at most, as a
+share."""
 
 
 class Reference(msgspec.Struct, frozen=True):
@@ -60,7 +61,7 @@ class Check(NamedTuple):
     """One value, and the bounds that it must lie in."""
 
     name: str
-    """What was measured, and how."""
+    """Quantity that was measured, and the method."""
     value: float
     low: float
     high: float
@@ -158,7 +159,7 @@ class Plot(NamedTuple):
 
 
 class Findings(NamedTuple):
-    """What a scene found."""
+    """Findings of a scene."""
 
     checks: list[Check]
     plots: Sequence[Plot] = ()

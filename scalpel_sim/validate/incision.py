@@ -42,11 +42,11 @@ class DrawnIncision(NamedTuple):
     """An incision; a row for each frame in which the tip is drawn."""
 
     travel: FloatArray
-    """How far the tip has been drawn [m], shape (n,)."""
+    """Way that the tip has been drawn [m], shape (n,)."""
     force: FloatArray
     """Force of the tissue on the blade, against the motion [N], shape (n,)."""
     ahead: FloatArray
-    """How far the edge is ahead of where its material is at rest [m], shape (n,): of the tissue
+    """Lead of the edge over where its material is at rest [m], shape (n,): of the tissue
     around it, without the stretch of what is nearer than the mesh resolves."""
     paid: FloatArray
     """Area that the blade has paid for since the tip went in: work over toughness [m2], (n,)."""

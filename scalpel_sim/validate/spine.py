@@ -15,7 +15,7 @@ _MATERIAL = Material(10e3, toughness=20.0, viscous_damping=50.0)
 _EDGE, _THICKNESSES = 0.02, (0.4e-3, 1e-3)
 """Length of the blade [m], and how thick blades are [m]."""
 _DEPTH, _SPEED = 2e-3, 0.05
-"""How deep the back is pressed [m], and how fast [m/s]."""
+"""Depth to which the back is pressed [m], and speed [m/s]."""
 _ABOVE = 0.5e-3
 """Height of the back above the skin at the begin [m]."""
 _CELLS = ((12, 12, 6), (20, 20, 10))
@@ -30,7 +30,7 @@ class Dent(NamedTuple):
     """A back that is pressed into a block and held."""
 
     depth: FloatArray
-    """How deep the back is [m]."""
+    """Depth of the back [m]."""
     force: FloatArray
     """Force on the blade, upwards [N]."""
     held: float

@@ -17,11 +17,11 @@ from scalpel_sim.hands.commands import (
 )
 
 MESSAGES_PER_SECOND = 300.0
-"""How many messages a page may send in a second, on average: a mouse sends at most 125, a page that
-draws sixty pictures a second some sixty of each kind."""
+"""Number of messages that a page may send in a second, on average: a mouse sends at most 125, a
+page that draws sixty pictures a second some sixty of each kind."""
 
 MOST_AT_ONCE = 100.0
-"""How many messages may come at once, after the page's thread has hung for a moment."""
+"""Number of messages that may come at once, after the page's thread has hung for a moment."""
 
 
 def is_own_page(host: str, origin: str | None) -> bool:
@@ -62,8 +62,8 @@ class Leadership:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.n_dropped = 0
-        """How many messages were dropped: no commands, too large, too many, or of a page that does
-        not lead."""
+        """Number of messages that were dropped: no commands, too large, too many, or of a page that
+        does not lead."""
         self._token, self._pass_on, self._clock = token, pass_on, clock
         self._pages: dict[LeadingPage, _Allowance] = {}
         self._leader: LeadingPage | None = None
@@ -126,7 +126,7 @@ class Leadership:
 
 
 class _Allowance:
-    """How many messages a page may still send: a bucket that fills at a constant rate."""
+    """Number of messages that a page may still send: a bucket that fills at a constant rate."""
 
     def __init__(self, now: float) -> None:
         self._room, self._at = MOST_AT_ONCE, now

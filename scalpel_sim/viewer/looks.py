@@ -1,4 +1,4 @@
-"""How bodies look by material: their colours outside and inside, vessels, fibres and rim."""
+"""Looks of bodies by material: their colours outside and inside, vessels, fibres and rim."""
 
 from typing import NamedTuple
 

@@ -25,7 +25,7 @@ from tissue import CUT_COLOUR, SKIN_COLOUR, FloatArray, Surface
 _log = logging.getLogger(__name__)
 
 PATIENCE = 3.0
-"""How long meshcat's server may take to answer before it counts as gone [s]. It usually takes a
+"""Time in which meshcat's server answers, before it counts as gone [s]. It usually takes a
 millisecond."""
 
 HEAD_LENGTH = 0.3

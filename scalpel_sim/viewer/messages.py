@@ -94,7 +94,7 @@ class SceneState(NamedTuple):
     readings: Readings | None = None
     """Numbers to show next to the picture."""
     live: LiveState | None = None
-    """How the run is, if the page controls it."""
+    """State of the run, if the page controls it."""
     values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES
     """Quantities at the vertices of the surface, for pages that show them as colours, SI."""
 

@@ -17,7 +17,7 @@ LAST_VISIBLE_GROUP = 2
 for instance, collision shapes."""
 
 PADS = ("pad_low", "pad_high")
-"""How the names of the pads of graspers end; see `arm/assets/grasper.xml`."""
+"""Ends of the names of the pads of graspers; see `arm/assets/grasper.xml`."""
 
 PLANE_EXTENT = 0.5
 """Half width [m] at which a plane is drawn that is infinite in the model."""

@@ -143,7 +143,7 @@ GROUND_WIDTH = 0.22
 """Width of the strips that are ground to the edge, in widths of the blade."""
 
 HOLLOW = 0.12
-"""How far normals lean away from the middle of a blade, at its ends: as if its flats were ground
+"""Lean of normals away from the middle of a blade, at its ends: as if its flats were ground
 hollow. Flats that are quite flat reflect one thing, and look like card."""
 
 

@@ -83,7 +83,7 @@ class HandState(
     tag="set_hand",
     rename={"is_engaged": "engaged", "has_ended": "ended", "is_closed": "closed"},
 ):
-    """How the hand is that the page leads: a command, with the names that the page reads."""
+    """State of the hand that the page leads: a command, with the names that the page reads."""
 
     tip: FloatArray
     """Where the tip of the chosen instrument is led [m], world frame, shape (3,)."""
@@ -114,7 +114,7 @@ class RunState(
     tag="set_run",
     rename={"is_paused": "paused", "n_strokes": "strokes", "has_ended": "ended"},
 ):
-    """How the run is that the page controls: a command, with the names that the page reads."""
+    """State of the run that the page controls: a command, with the names that the page reads."""
 
     is_paused: bool
     """Whether its time stands still."""
@@ -125,15 +125,15 @@ class RunState(
     can_go_back: bool
     """Whether it can go back to its start."""
     n_strokes: int
-    """How many strokes can be undone."""
+    """Number of strokes that can be undone."""
     has_ended: bool = False
     """Whether the page has ended it."""
     notice: str = ""
     """The message to the person."""
     results: RunResults | None = None
-    """What it has given; None: it goes on."""
+    """Results of it; None: it goes on."""
     stylus_distance: float = 0.0
-    """How far the stylus of a device is from the blade [m]."""
+    """Distance of the stylus of a device from the blade [m]."""
 
 
 class LiveState(NamedTuple):

@@ -45,7 +45,7 @@ TARGET_OPACITY = 0.15
 """Opacity of the marker of the hand's target pose: only a hint."""
 
 MIX, ADD = 1, 2
-"""How a reflection is combined with the colour below it, in the numbers of three.js: metal mixes,
+"""Combinations of a reflection with the colour below it, in the numbers of three.js: metal mixes,
 varnish adds."""
 
 _WET = {

@@ -66,7 +66,7 @@ MOST_UNSENT = 8
 """Messages at most that a page's socket holds because the page does not read them."""
 
 SECONDS_TO_ANSWER = 10.0
-"""How often a page is pinged to see whether it reads, and how long its browser may take to answer
+"""Interval of pings that show whether a page reads, and time in which its browser is to answer
 [s]. The browser answers for a page that is hidden, or that is stopped in a debugger."""
 
 LARGEST_MESSAGE = 1 << 14

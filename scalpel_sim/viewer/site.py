@@ -1,4 +1,4 @@
-"""What the live viewer serves by HTTP: the page, and the replay of a run that has ended."""
+"""Answers of the live viewer by HTTP: the page, and the replay of a run that has ended."""
 
 import hmac
 import secrets
@@ -67,17 +67,21 @@ class Site:
         return self._token is not None and hmac.compare_digest(self._token.encode(), token.encode())
 
 
-class PageRequest(tornado.web.RequestHandler):
-    """A browser's request for the page."""
+class SiteRequest(tornado.web.RequestHandler):
+    """A browser's request for a document of the site."""
 
     def initialize(self, site: Site) -> None:
-        """Set what has the document to serve; called by tornado."""
+        """Set the site that has the document; called by tornado."""
         self._site = site
 
     def set_default_headers(self) -> None:
         """Set the headers of every answer; called by tornado."""
         for name, value in PAGE_HEADERS.items():
             self.set_header(name, value)
+
+
+class PageRequest(SiteRequest):
+    """A browser's request for the page."""
 
     def get(self) -> None:
         """Send the page."""
@@ -88,17 +92,8 @@ class PageRequest(tornado.web.RequestHandler):
         self.write(self._site.document)
 
 
-class ReplayRequest(tornado.web.RequestHandler):
+class ReplayRequest(SiteRequest):
     """A browser's request for the replay: for who has the token of the page, and no other file."""
-
-    def initialize(self, site: Site) -> None:
-        """Set what knows the file; called by tornado."""
-        self._site = site
-
-    def set_default_headers(self) -> None:
-        """Set the headers of every answer; called by tornado."""
-        for name, value in PAGE_HEADERS.items():
-            self.set_header(name, value)
 
     def get(self) -> None:
         """Send the file."""

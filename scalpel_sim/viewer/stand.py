@@ -1,4 +1,4 @@
-"""What a body lies above on the page: a draped stand on the floor, and a tray of steel on it.
+"""Stand below a body on the page: a draped stand on the floor, and a tray of steel on it.
 
 It is drawn for the eye alone, so that a body that hangs in its supports does not float in fog. No
 part of a run touches it, and it stands clear of what moves: body, blades and arms.
@@ -19,7 +19,7 @@ TRAY_GAP = 0.025
 beneath a body."""
 
 DRAPE_MARGIN = 0.8
-"""How far the drape goes beyond the body where nothing stands there, in diagonals of the body."""
+"""Width of the drape beyond the body where nothing stands there, in diagonals of the body."""
 
 LEAST_DRAPE_MARGIN = -0.1
 """Where something leaves less room than that beside the body there is no stand. Below 0 the stand
@@ -29,10 +29,10 @@ STAND_GAP = 0.01
 """Distance of the stand from what stands next to it [m]."""
 
 _TRAY_MARGIN, _TRAY_HEIGHT = 0.25, 0.07
-"""How far the tray goes beyond the body, and how high it is, in diagonals of the body."""
+"""Width of the tray beyond the body, and its height, in diagonals of the body."""
 
 _DISH = 0.25
-"""How much lower the middle of a tray is, in heights of the tray: a mirror that is quite flat shows
+"""Depth of the middle of a tray, in heights of the tray: a mirror that is quite flat shows
 one thing."""
 
 _CORNER, _HEM = 0.12, 0.03

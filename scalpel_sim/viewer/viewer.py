@@ -42,10 +42,10 @@ if TYPE_CHECKING:  # importing it takes half a second
     from scalpel_sim.viewer.meshcat_scene import MeshcatScene
 
 START_TIMEOUT = 30.0
-"""How long the viewer's process may take to start [s]. It usually takes half a second."""
+"""Time in which the viewer's process is to start [s]. It usually takes half a second."""
 
 CLOSE_TIMEOUT = 3.0
-"""How long the viewer's process may take to end before it is killed [s]."""
+"""Time in which the viewer's process is to end, before it is killed [s]."""
 
 HIGHEST_PORT = 65535
 """Largest port number of TCP."""

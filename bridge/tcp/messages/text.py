@@ -24,7 +24,7 @@ _LONGEST_NAME = 64
 _UNNAMED = "tissue"
 
 WANTED_NAME = f"1 to {_LONGEST_NAME} letters, digits, underscores and dashes"
-"""What the name of a scene is, for the documentation."""
+"""Meaning of the name of a scene, for the documentation."""
 
 SentSceneName = Annotated[str, msgspec.Meta(pattern=rf"^[A-Za-z0-9_-]{{1,{_LONGEST_NAME}}}\Z")]
 """Name of a scene between two processes. The other side may name a folder by it: it is no path."""

@@ -30,19 +30,19 @@ INSERTED_AT, WITHDRAWN_AT = 0.2, 0.73
 of the organ."""
 
 DRAG_SHARE = 0.15
-"""How far the tip is drawn on beyond that, as a share of toughness / Young's modulus, because the
-edge runs ahead of the material that it cuts. Without it the incision in liver, on its underside,
-came out 5 mm short, of 35 mm."""
+"""Distance by which the tip is drawn on beyond that, as a share of toughness / Young's modulus,
+because the edge runs ahead of the material that it cuts. Without it the incision in liver, on its
+underside, came out 5 mm short, of 35 mm."""
 
 WITHDRAWN_LATEST = 0.85
-"""How far the drag may draw the tip, as a share of the body's length from the side where it comes
-from."""
+"""Distance to which the drag may draw the tip, as a share of the body's length from the side where
+it comes from."""
 
 LEAST_LENGTH = 0.05
 """Least length of an incision, as a share of the body's: shorter, it is a stab."""
 
 _GAP = 4e-3
-"""How far above the surface the tip starts, and ends [m]."""
+"""Height above the surface at which the tip starts, and ends [m]."""
 
 _REACH = 3.0
 """Height of the heel over the tip, in depths: tissue ahead of the edge rises."""

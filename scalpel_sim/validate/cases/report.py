@@ -1,4 +1,4 @@
-"""What a case leaves behind: a table as CSV, plots, JSON, and a summary on the console."""
+"""Files that a case leaves behind: a table as CSV, plots, JSON, and a summary on the console."""
 
 import csv
 import json

@@ -49,7 +49,7 @@ ReachedTime = Callable[[float], None]
 
 
 class CaseRecord(NamedTuple):
-    """What was recorded."""
+    """Records of the case."""
 
     columns: dict[str, FloatArray]
     """Time [s] and each record, shape (n_rows,), in the order of the file."""

@@ -27,7 +27,7 @@ FIRST_FRAME = 300
 """Number of frames before those that count: the edge then is in the tissue."""
 N_FRAMES = 100
 N_REPEATS = 5
-"""How often the same frames are done again; the median counts."""
+"""Number of times that the same frames are done again; the median counts."""
 
 MILLISECOND = 1e-3
 

@@ -45,7 +45,7 @@ _CHAIN = 100_000
 """Rounds of the chain that measures the clock: 50 µs at 4 GHz, short compared with a time slice."""
 _CYCLES_PER_ROUND = 2
 _CLOCK_SECONDS = 0.2
-"""How long the clock is measured [s]. In the first half of it the processor wakes up."""
+"""Time for which the clock is measured [s]. In the first half of it the processor wakes up."""
 
 
 def describe_machine() -> dict[str, Any]:

@@ -44,7 +44,7 @@ WALL = Clock("wall", time.perf_counter)
 
 
 class Quantity(msgspec.Struct, frozen=True):
-    """What is measured, and in which unit."""
+    """Quantity that is measured, and its unit."""
 
     benchmark: str
     case: str
@@ -58,7 +58,7 @@ class Quantity(msgspec.Struct, frozen=True):
     better: str = LOWER
     """`lower`, `higher`, or `neither`."""
     note: str = ""
-    """What to know before comparing it with another."""
+    """Facts to know before comparing it with another."""
 
 
 class Measurement(Quantity, frozen=True, kw_only=True):

@@ -51,7 +51,7 @@ class Comparison(NamedTuple):
     before: Measurement
     now: Measurement
     ratio: float
-    """How many times better it is now: above 1 is faster."""
+    """Factor by which it is better now: above 1 is faster."""
     verdict: str
 
 

@@ -120,7 +120,8 @@ def test_slides_of_a_grasper_count_with_how_far_they_slide_and_move_what_turns()
     arm.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0.0, 0.0])
     add_grasper(spec, "arm")
     model = spec.compile()
-    bounds_of_motions(model, mujoco.MjData(model), geoms_of(model))
+    found = bounds_of_motions(model, mujoco.MjData(model), geoms_of(model))
+    assert min(found) == pytest.approx(1.0), "exact where only pads slide"
 
 
 def test_nothing_is_known_before_the_start_nor_of_other_joints():

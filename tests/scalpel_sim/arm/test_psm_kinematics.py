@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.arm.arm import ASSETS, Arm
+from scalpel_sim.arm.kinematics import ArmPoses
 from scalpel_sim.arm.placement import PlacementError, place
 from scalpel_sim.arm.psm_kinematics import TROCAR_CLEARANCE, psm_geometry
 from tests.support.planned_strokes import PLANNED, plan_stroke
@@ -101,9 +102,8 @@ def test_the_spheres_cover_the_parts_up_to_the_wrist_within_a_centimetre():
     for joints in random_joints(20):
         data.qpos[:] = with_bars(joints)
         mujoco.mj_kinematics(model, data)
-        centres, radii = measures.spheres(
-            None, data.qpos[None], np.zeros((1, 3)), np.eye(3)[None], 0.0
-        )
+        poses = ArmPoses(None, data.qpos[None], np.zeros((1, 3)), np.eye(3)[None], 0.0)
+        centres, radii = measures.spheres(poses)
         for i in parts:
             if model.geom_bodyid[i]:
                 box = model.geom_aabb[i, :3] + corners * model.geom_aabb[i, 3:]

@@ -222,8 +222,10 @@ def test_a_pose_that_is_farther_ahead_than_the_run_remembers_is_reached(client):
     goal = start + np.array([0.0, 0.0, 0.05])
     client.send("servo_cp", goal, turned)
     client.until(lambda: np.linalg.norm(client.pose()[0] - goal) < 1e-3)
+    np.testing.assert_allclose(client.pose("setpoint_cp")[0], goal, atol=1e-9)
     client.send("servo_cp", start, turned)
     client.until(lambda: np.linalg.norm(client.pose()[0] - start) < 1e-3)
+    np.testing.assert_allclose(client.pose("setpoint_cp")[0], start, atol=1e-9)
 
 
 def test_the_three_wrenches_are_one_seen_from_the_tip_in_two_frames_and_from_the_origin(client):
