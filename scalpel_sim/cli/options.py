@@ -136,7 +136,7 @@ class BodyOptions:
     """The body, and the sides at which it is held."""
 
     mesh: Path | None = None
-    "Cut this tetrahedral mesh instead of a scene: Gmsh .msh, legacy .vtk, or .vtu."
+    "Cut this tetrahedral mesh instead of a scene: Gmsh, VTK, Medit, TetGen, Abaqus or Nastran."
     scale: float | None = None
     "Metres in one unit of the mesh file: 0.001 for millimetres."
 

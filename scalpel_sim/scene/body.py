@@ -68,7 +68,7 @@ class BodyTable(TomlTable, kw_only=True, frozen=True, dict=True):
     layers: Whole | None = None
     """Layers of elements of a cylinder; without, as thick as the rings."""
     file: FileName | None = None
-    """File of a mesh: Gmsh .msh, legacy .vtk, or .vtu."""
+    """File of a mesh: Gmsh, VTK, Medit, TetGen, Abaqus or Nastran."""
     scale: Positive | None = None
     """Metres in one unit of the mesh file: 0.001 for millimetres."""
 

@@ -95,6 +95,24 @@ class ByteReader:
         on_lines = np.concatenate([np.zeros(0, dtype=np.int64), *counts])
         return on_lines[on_lines > 0]
 
+    def after_words(self, count: int, what: str) -> int:
+        """Return where the next `count` words end."""
+        at, left, data = self.at, count, self.data
+        while left > 0:
+            end = data.find(b"\n", at)
+            end = len(data) if end < 0 else end
+            words = data[at:end].split()
+            if len(words) >= left:
+                for _ in range(left):
+                    match = re.compile(rb"\s*\S+").match(data, at)
+                    at = match.end() if match else at
+                return at
+            left -= len(words)
+            if end == len(data):
+                self.fail(f"expected {count} {what}, found {count - left} to the end of the file")
+            at = end + 1
+        return at
+
     def expect(self, count: int, found: int, what: str, at: int) -> None:
         """Fail, at the line of byte `at`, unless as many things were found as there should be."""
         if found != count:

@@ -1,4 +1,4 @@
-"""Types of cells, those of VTK, and a clear error where a mesh has none of four nodes."""
+"""Types of cells by their shapes, and a clear error where a file has none that fill a volume."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -18,6 +18,18 @@ class CellType(NamedTuple):
     """Dimension: 0 for points to 3 for volumes."""
     n_nodes: int
     """Number of nodes; 0 where it varies."""
+    shape: str = ""
+    """Name of the shape; "" where it is none that is known by its corners."""
+
+    @property
+    def n_corners(self) -> int:
+        """Number of corners, which are the first nodes; 0 where it is not known."""
+        return _SHAPES[self.shape][1] if self.shape else 0
+
+    @property
+    def fills(self) -> bool:
+        """Whether such a cell is a tetrahedron or can be divided into some."""
+        return self.dimension == 3 and bool(self.shape)
 
 
 _SHAPES = {
@@ -30,8 +42,16 @@ _SHAPES = {
     "prisms": (3, 6),
     "wedges": (3, 6),
     "hexahedra": (3, 8),
+    "voxels": (3, 8),
 }
 """Shapes of cells: dimension, and number of corners."""
+
+
+def cell_type(shape: str, n_nodes: int) -> CellType:
+    """Return the type of cells of a shape with that many nodes."""
+    dimension, n_corners = _SHAPES[shape]
+    name = shape if n_nodes == n_corners else f"{shape} with {n_nodes} nodes"
+    return CellType(name, dimension, n_nodes, shape)
 
 
 def cell_types(numbers: Mapping[str, Mapping[int, int]]) -> dict[int, CellType]:
@@ -40,66 +60,37 @@ def cell_types(numbers: Mapping[str, Mapping[int, int]]) -> dict[int, CellType]:
     Args:
         numbers: For each shape the number of each type, and how many nodes that has.
     """
-    made = {}
-    for shape, types in numbers.items():
-        dimension, n_corners = _SHAPES[shape]
-        for number, n in types.items():
-            name = shape if n == n_corners else f"{shape} with {n} nodes"
-            made[number] = CellType(name, dimension, n)
-    return made
+    return {
+        number: cell_type(shape, n_nodes)
+        for shape, types in numbers.items()
+        for number, n_nodes in types.items()
+    }
 
 
-def expect_tetrahedra(
-    counts: Mapping[int, int], cell_types: Mapping[int, CellType], tetrahedron: int
-) -> None:
-    """Raise an error unless there are tetrahedra and no other volumes.
+def expect_volumes(counts: Mapping[CellType, int]) -> None:
+    """Raise an error unless there are cells that fill a volume, and all volumes do.
 
     Args:
-        counts: Number of cells of each type, by the format's number of the type.
-        cell_types: The types of cells by the format's numbers.
-        tetrahedron: The format's number of the tetrahedron with four nodes.
+        counts: Number of cells of each type.
 
     Raises:
-        MeshError: There are none, or there are other volumes, which would leave holes.
+        MeshError: There are none, or others that cannot be divided, which would leave holes.
     """
-    named = {
-        number: cell_types.get(number, CellType(f"cells of type {number}", 3, 0))
-        for number in counts
-    }
-    found = ", ".join(f"{counts[number]} {named[number].name}" for number in sorted(counts))
-    volumes = [n for n in counts if named[n].dimension == 3 and n != tetrahedron]
-    if volumes:
+    types = [each for each, n in counts.items() if n]
+    found = ", ".join(f"{counts[each]} {each.name}" for each in types)
+    if any(each.dimension == 3 and not each.fills for each in types):
         raise MeshError(
-            f"expected tetrahedra with four nodes only, found {found}: mesh the body with "
-            "tetrahedra of first order"
+            f"expected tetrahedra, pyramids, wedges and hexahedra, found {found}: mesh the body "
+            "with tetrahedra"
         )
-    if tetrahedron in counts:
+    if any(each.fills for each in types):
         return
-    if any(named[n].dimension == 2 for n in counts):
+    if any(each.dimension == 2 for each in types):
         raise MeshError(
             f"only a surface, no tetrahedra: found {found}. Fill it with tetrahedra first, with "
             "Gmsh or fTetWild for example"
         )
     raise MeshError(f"there are no tetrahedra; found {found or 'no cells'}")
-
-
-def expect_ignorable(n_nodes: int, cell: str) -> None:
-    """Raise an error unless a cell that is no tetrahedron is a point, a line or a triangle.
-
-    A tetrahedron whose type is wrong has four nodes. It would be lost without a word.
-
-    Args:
-        n_nodes: How many nodes it has.
-        cell: What it is called in messages.
-
-    Raises:
-        MeshError: It has more than three nodes.
-    """
-    if n_nodes > 3:
-        raise MeshError(
-            f"{cell} has {n_nodes} nodes: besides tetrahedra there may be points, lines and "
-            "triangles only. If it is a tetrahedron its type is wrong; if not, leave it out"
-        )
 
 
 def uniform_records(
@@ -131,86 +122,3 @@ def uniform_records(
             return records[: n_equal + int(np.argmin(equal))]
         n_equal, n_tried = n_equal + len(piece), 4 * n_tried
     return records
-
-
-_TETRAHEDRON = 10
-
-_CELL_TYPES = {
-    **cell_types(
-        {
-            "points": {1: 1},
-            "lines": {3: 2, 21: 3},
-            "triangles": {5: 3, 22: 6, 34: 7},
-            "quadrangles": {9: 4, 23: 8, 28: 9},
-            "tetrahedra": {10: 4, 24: 10},
-            "hexahedra": {12: 8, 25: 20},
-            "wedges": {13: 6},
-            "pyramids": {14: 5},
-        }
-    ),
-    0: CellType("empty cells", 0, 0),
-    2: CellType("groups of points", 0, 0),
-    4: CellType("polylines", 1, 0),
-    6: CellType("triangle strips", 2, 0),
-    7: CellType("polygons", 2, 0),
-    8: CellType("pixels", 2, 4),
-    11: CellType("voxels", 3, 8),
-    42: CellType("polyhedra", 3, 0),
-    **{
-        first + k: CellType(f"{kind} {shape}", dimension, 0)
-        for first, kind in ((68, "Lagrange"), (75, "Bezier"))
-        for k, (shape, dimension) in enumerate(
-            (("curves", 1), ("triangles", 2), ("quadrangles", 2), ("tetrahedra", 3))
-        )
-    },
-}
-
-
-def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntArray) -> IntArray:
-    """Return the nodes of the tetrahedra, shape (n_tets, 4).
-
-    Args:
-        types: VTK's type of each cell, shape (n_cells,).
-        starts: Where in `flat` the nodes of each cell begin, shape (n_cells,).
-        sizes: How many nodes each cell has, shape (n_cells,).
-        flat: The nodes of all cells, one cell after another.
-
-    Raises:
-        MeshError: There are no tetrahedra, there are other volumes, a cell is not within `flat`,
-            its type disagrees with its number of nodes, or it has more than three nodes and is no
-            tetrahedron.
-    """
-    numbers, counts = np.unique(types, return_counts=True)
-    expect_tetrahedra(
-        dict(zip(numbers.tolist(), counts.tolist(), strict=True)), _CELL_TYPES, _TETRAHEDRON
-    )
-    outside = np.flatnonzero((starts < 0) | (sizes < 0) | (sizes > len(flat) - starts))
-    if outside.size:
-        cell = outside[0]
-        raise MeshError(
-            f"cell {cell} has {sizes[cell]} nodes from entry {starts[cell]} on, but there are "
-            f"{len(flat)} entries"
-        )
-    is_tetrahedron = types == _TETRAHEDRON
-    for number in numbers.tolist():
-        _check_sizes(number, np.flatnonzero(types == number), sizes)
-    tetrahedra: IntArray = flat[starts[is_tetrahedron][:, None] + np.arange(4)]
-    return tetrahedra
-
-
-def _check_sizes(number: int, cells: IntArray, sizes: IntArray) -> None:
-    """Check how many nodes the cells of one type have.
-
-    Raises:
-        MeshError: They do not have as many as their type, or too many to be ignored.
-    """
-    cell_type = _CELL_TYPES[number]
-    wrong = cells[sizes[cells] != cell_type.n_nodes] if cell_type.n_nodes else cells[:0]
-    if wrong.size:
-        raise MeshError(
-            f"cell {wrong[0]} is one of the {cell_type.name} and has {sizes[wrong[0]]} nodes, not "
-            f"{cell_type.n_nodes}"
-        )
-    if number != _TETRAHEDRON:
-        largest = cells[np.argmax(sizes[cells])]
-        expect_ignorable(int(sizes[largest]), f"cell {largest}, one of the {cell_type.name},")

@@ -1,7 +1,7 @@
 """Gmsh files (`.msh`): 1.0, 2.0 to 2.2 and 4.1, text and binary.
 
-Versions 1 and 2 have one record for each node and element; version 4.1 has them in blocks, one for
-each entity of the geometry.
+Versions 1 and 2, with one record for each node and element, are read here. Labels are the physical
+groups of the volumes.
 """
 
 import numpy as np
@@ -9,14 +9,13 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader, as_floats, as_ints, count_in, shown
 from tissue.io.cell_types import uniform_records
+from tissue.io.gmsh_4 import read_gmsh_4
 from tissue.io.gmsh_elements import Elements, element_type
-from tissue.types import TetrahedralMesh
-
-LARGEST_EXACT = 2**53
-"""Whole numbers up to this are exact in double precision, in which text is read."""
+from tissue.io.gmsh_names import group_names
+from tissue.io.mesh_file import MeshFile
 
 
-def read_gmsh(data: bytes) -> TetrahedralMesh:
+def read_gmsh(data: bytes) -> MeshFile:
     """Read Gmsh 1.0, 2.0 to 2.2 and 4.1, text and binary; the mesh is not checked.
 
     Source: the Gmsh reference manual, "Gmsh file formats".
@@ -57,16 +56,16 @@ def _byte_order(reader: ByteReader) -> str:
     return orders[one]
 
 
-def read_gmsh_1(reader: ByteReader) -> TetrahedralMesh:
+def read_gmsh_1(reader: ByteReader) -> MeshFile:
     """Read what follows the line "$NOD"."""
     tags, positions = _nodes_as_text(reader, rb"\$ENDNOD", "$ENDNOD")
     _enter(reader, rb"\$ELM", "$ELM")
     # A record is tag, type, physical region, elementary region, number of nodes, nodes.
     elements = _elements_as_text(reader, rb"\$ENDELM", "$ENDELM", n_before=5, at_size=4)
-    return elements.mesh(tags, positions)
+    return elements.file("Gmsh 1", tags, positions, {})
 
 
-def read_gmsh_2(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
+def read_gmsh_2(reader: ByteReader, byte_order: str) -> MeshFile:
     """Read what follows the header; `byte_order` is "<" or ">" in a binary file, else ""."""
     if b"$ParametricNodes" in reader.data:
         reader.fail(
@@ -83,7 +82,8 @@ def read_gmsh_2(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
     else:
         # A record is tag, type, number of further tags, those tags, nodes.
         elements = _elements_as_text(reader, rb"\$EndElements", "$EndElements", 3, at_size=2)
-    return elements.mesh(tags, positions)
+    form = "binary" if byte_order else "text"
+    return elements.file(f"Gmsh 2, {form}", tags, positions, group_names(reader))
 
 
 def _enter(reader: ByteReader, pattern: bytes, name: str) -> None:
@@ -129,6 +129,7 @@ def _elements_as_text(
     flat = reader.ints(end, "whole numbers")
     reader.expect(n_elements, len(on_lines), "elements, one on each line", at)
     elements = Elements()
+    n_first = 2 if at_size == 4 else 3  # where the groups begin
     start, n_read = 0, 0
     while n_read < n_elements:
         here = f"element {n_read + 1} of {n_elements}"
@@ -151,7 +152,10 @@ def _elements_as_text(
                 f"its line, found {on_lines[k]}",
                 at,
             )
-        elements.add(number, records[:, 0], records[:, stride - cell_type.n_nodes :])
+        groups = np.zeros((len(records), 2), dtype=np.int64)
+        n_groups = 2 if at_size == 4 else min(n_tags, 2)
+        groups[:, :n_groups] = records[:, n_first : n_first + n_groups]
+        elements.add(number, records[:, 0], groups, records[:, stride - cell_type.n_nodes :])
         start, n_read = start + records.size, n_read + len(records)
     if start != len(flat):
         reader.fail(f"expected {n_elements} elements, found {len(flat) - start} numbers more", at)
@@ -188,7 +192,9 @@ def _elements_in_binary(reader: ByteReader, byte_order: str) -> Elements:
         stride = 1 + n_tags + cell_type.n_nodes
         flat = reader.binary(n_here * stride, byte_order + "i4", f"numbers of {cell_type.name}")
         records = as_ints(flat).reshape(n_here, stride)
-        elements.add(number, records[:, 0], records[:, stride - cell_type.n_nodes :])
+        groups = np.zeros((n_here, 2), dtype=np.int64)
+        groups[:, : min(n_tags, 2)] = records[:, 1 : 1 + min(n_tags, 2)]
+        elements.add(number, records[:, 0], groups, records[:, stride - cell_type.n_nodes :])
         n_read += n_here
     _expect_end(reader, "$EndElements")
     return elements
@@ -200,134 +206,3 @@ def _expect_end(reader: ByteReader, name: str) -> None:
     line = reader.line_with_text()
     if line != name:
         reader.fail(f"expected {name}, found {shown(line)}: is the number before it right?", at)
-
-
-def read_gmsh_4(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
-    """Read what follows the header; `byte_order` is "<" or ">" in a binary file, else ""."""
-    tags, positions = _nodes(_section(reader, "Nodes", byte_order))
-    elements = _elements(_section(reader, "Elements", byte_order))
-    return elements.mesh(tags, positions)
-
-
-class _Text:
-    """The numbers of a section that is written as text, taken in their order."""
-
-    def __init__(self, reader: ByteReader, name: str) -> None:
-        self.reader = reader
-        self._start = reader.at
-        end = reader.find(rb"\$End" + name.encode(), f"$End{name}").start()
-        self._numbers = reader.floats(end, "numbers")
-        self._at = 0
-
-    def floats(self, count: int, what: str) -> FloatArray:
-        left = len(self._numbers) - self._at
-        if count > left:
-            self.reader.fail(f"expected {count} {what}, found {left} to the end", self._start)
-        self._at += count
-        return self._numbers[self._at - count : self._at]
-
-    def sizes(self, count: int, what: str) -> IntArray:
-        numbers = self.floats(count, what)
-        whole = np.abs(numbers) <= LARGEST_EXACT  # false for NaN
-        whole &= np.floor(numbers) == numbers
-        if not whole.all():
-            wrong = numbers[~whole][0]
-            self.reader.fail(f"expected whole {what}, found {wrong:g}", self._start)
-        return numbers.astype(np.int64)
-
-    ints = sizes
-
-    def end(self) -> None:
-        left = len(self._numbers) - self._at
-        if left:
-            self.reader.fail(f"expected the end of the section, found {left} more", self._start)
-
-
-class _Binary:
-    """The same of a section that is written in binary: C's `int`, `size_t` and `double`."""
-
-    def __init__(self, reader: ByteReader, name: str, byte_order: str) -> None:
-        self.reader = reader
-        self._name = name
-        self._byte_order = byte_order
-
-    def ints(self, count: int, what: str) -> IntArray:
-        return as_ints(self.reader.binary(count, self._byte_order + "i4", what))
-
-    def sizes(self, count: int, what: str) -> IntArray:
-        return as_ints(self.reader.binary(count, self._byte_order + "u8", what))
-
-    def floats(self, count: int, what: str) -> FloatArray:
-        return as_floats(self.reader.binary(count, self._byte_order + "f8", what))
-
-    def end(self) -> None:
-        at = self.reader.at
-        line = self.reader.line_with_text()
-        if line != f"$End{self._name}":
-            self.reader.fail(f"expected $End{self._name} after what was counted", at)
-
-
-_Section = _Text | _Binary
-
-
-def _section(reader: ByteReader, name: str, byte_order: str) -> _Section:
-    """Return the numbers of a section."""
-    reader.at = reader.find(rb"(?m)^[ \t]*\$%b[ \t]*\r?\n" % name.encode(), f"${name}").end()
-    return _Binary(reader, name, byte_order) if byte_order else _Text(reader, name)
-
-
-def _nodes(section: _Section) -> tuple[IntArray, FloatArray]:
-    """Return tags, shape (n_nodes,), and positions, shape (n_nodes, 3)."""
-    n_blocks, n_nodes, _, _ = section.sizes(4, "numbers before the nodes").tolist()
-    tags, positions = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
-    for _ in range(n_blocks):
-        dimension, _, is_parametric = section.ints(3, "numbers before a block of nodes").tolist()
-        (n_here,) = _counts(section, 1, "nodes in a block")
-        if is_parametric not in (0, 1) or not 0 <= dimension <= 3:
-            section.reader.fail(
-                "expected a block of nodes of dimension 0 to 3, parametric 0 or 1; found "
-                f"{dimension} and {is_parametric}"
-            )
-        width = 3 + is_parametric * dimension  # parameters u, v, w may follow x, y, z
-        tags.append(section.sizes(n_here, "tags of nodes"))
-        coordinates = section.floats(n_here * width, "coordinates").reshape(n_here, width)
-        positions.append(coordinates[:, :3])
-    section.end()
-    found = sum(len(block) for block in tags)
-    if found != n_nodes:
-        section.reader.fail(f"expected {n_nodes} nodes, found {found}")
-    return np.concatenate(tags), np.concatenate(positions)
-
-
-def _elements(section: _Section) -> Elements:
-    """Read the blocks of elements."""
-    n_blocks, n_elements, _, _ = section.sizes(4, "numbers before the elements").tolist()
-    elements = Elements()
-    found = 0
-    for _ in range(n_blocks):
-        dimension, _, number = section.ints(3, "numbers before a block of elements").tolist()
-        (n_here,) = _counts(section, 1, "elements in a block")
-        cell_type = element_type(section.reader, number)
-        if dimension != cell_type.dimension:
-            section.reader.fail(
-                f"expected {cell_type.name} in a block of dimension {cell_type.dimension}, found "
-                f"one of dimension {dimension}"
-            )
-        width = 1 + cell_type.n_nodes
-        records = section.sizes(n_here * width, f"numbers of {cell_type.name}").reshape(
-            n_here, width
-        )
-        elements.add(number, records[:, 0], records[:, 1:])
-        found += n_here
-    section.end()
-    if found != n_elements:
-        section.reader.fail(f"expected {n_elements} elements, found {found}")
-    return elements
-
-
-def _counts(section: _Section, count: int, what: str) -> list[int]:
-    """Take `count` numbers of things, which cannot be negative."""
-    counts: list[int] = section.sizes(count, what).tolist()
-    if min(counts) < 0:
-        section.reader.fail(f"expected the number of {what}, found {min(counts)}")
-    return counts

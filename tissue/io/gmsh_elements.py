@@ -1,14 +1,14 @@
-"""Gmsh's types of elements, and nodes by their tags."""
+"""Gmsh's types of elements, and the elements of a file with the groups that they are in."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader
-from tissue.io.cell_types import CellType, cell_types, expect_ignorable, expect_tetrahedra
+from tissue.io.cell_types import CellType, cell_types
+from tissue.io.mesh_file import CellBlock, MeshFile, mesh_file
 from tissue.mesh.mesh_arrays import MeshError
-from tissue.types import TetrahedralMesh
-
-_TETRAHEDRON = 4
 
 _CELL_TYPES = cell_types(
     {
@@ -25,51 +25,73 @@ _CELL_TYPES = cell_types(
 
 
 class Elements:
-    """The elements read so far, by type: tag and nodes of each."""
+    """The elements read so far, by type: tag, groups and nodes of each."""
 
     def __init__(self) -> None:
         self._rows: dict[int, list[IntArray]] = {}
 
-    def add(self, number: int, tags: IntArray, nodes: IntArray) -> None:
+    def add(self, number: int, tags: IntArray, groups: IntArray, nodes: IntArray) -> None:
         """Add elements of one type.
 
         Args:
             number: Gmsh's number of the type.
             tags: Their tags, shape (n_elements,).
+            groups: The physical group and the part of the geometry that they are in, 0 for none,
+                shape (n_elements, 2).
             nodes: The tags of their nodes, shape (n_elements, n_nodes).
         """
         if len(nodes):
-            self._rows.setdefault(number, []).append(np.column_stack((tags, nodes)))
+            self._rows.setdefault(number, []).append(np.column_stack((tags, groups, nodes)))
 
-    def mesh(self, tags: IntArray, positions: FloatArray) -> TetrahedralMesh:
-        """Return the tetrahedra between nodes with `tags`, shape (n_nodes,), at `positions`.
+    def file(
+        self,
+        file_format: str,
+        tags: IntArray,
+        positions: FloatArray,
+        group_names: Mapping[int, str],
+        remarks: tuple[str, ...] = (),
+    ) -> MeshFile:
+        """Return the mesh of the elements.
+
+        Labels are the physical groups. Where no volume is in one, and the geometry has several
+        volumes, they are the numbers of these.
+
+        Args:
+            file_format: Name of the format.
+            tags: The tags of the nodes, shape (n_nodes,).
+            positions: Their positions, shape (n_nodes, 3).
+            group_names: Names of the physical groups of volumes.
+            remarks: What is to be said of the file.
 
         Raises:
-            MeshError: There are no tetrahedra, or cells that cannot be ignored next to them; a node
-                or one of these cells occurs twice, or no node has a tag that is named.
+            MeshError: see `mesh_file`; or an element occurs twice that is no volume.
         """
         rows = {number: np.concatenate(found) for number, found in self._rows.items()}
-        counts = {number: len(found) for number, found in rows.items()}
-        expect_tetrahedra(counts, _CELL_TYPES, _TETRAHEDRON)
-        wanted = rows.pop(_TETRAHEDRON)[:, 1:]
-        for number, ignored in sorted(rows.items()):
-            cell_type = _CELL_TYPES[number]
-            expect_ignorable(cell_type.n_nodes, f"an element, one of the {cell_type.name},")
-            _refuse_repeated_records(ignored, cell_type)
-        order = np.argsort(tags, kind="stable")
-        in_order = tags[order]
-        twice = np.flatnonzero(in_order[1:] == in_order[:-1])
-        if twice.size:
-            raise MeshError(f"node {in_order[twice[0]]} occurs twice")
-        at = np.searchsorted(in_order, wanted)
-        at[at == len(tags)] = 0
-        missing = in_order[at] != wanted if len(tags) else np.ones(wanted.shape, dtype=bool)
-        if missing.any():
-            raise MeshError(
-                f"index out of range: tetrahedron {np.argwhere(missing)[0, 0]} names node "
-                f"{wanted[missing][0]}, which is not among the {len(tags)} nodes of the file"
+        fills = {number for number in rows if _CELL_TYPES[number].fills}
+        for number in sorted(rows.keys() - fills):
+            _refuse_repeated_records(rows[number], _CELL_TYPES[number])
+        groups = [np.abs(rows[number][:, 1:3]) for number in fills]
+        column = _column_of_labels(np.concatenate(groups)) if groups else None
+        blocks = [
+            CellBlock(
+                _CELL_TYPES[number],
+                found[:, 3:],
+                found[:, 0],
+                np.abs(found[:, column]) if column is not None and number in fills else None,
             )
-        return TetrahedralMesh(positions, order[at])
+            for number, found in sorted(rows.items())
+        ]
+        names = group_names if column == 1 else {}
+        return mesh_file(
+            file_format, positions, blocks, tags=tags, label_names=names, remarks=remarks
+        )
+
+
+def _column_of_labels(groups: IntArray) -> int | None:
+    """Return which column of the rows is that of the labels, None for none."""
+    if groups[:, 0].any():
+        return 1
+    return 2 if len(np.unique(groups[:, 1])) > 1 else None
 
 
 def _refuse_repeated_records(rows: IntArray, cell_type: CellType) -> None:

@@ -1,7 +1,9 @@
 """Meshes from files, and bodies to files."""
 
+import logging
 import math
 import os
+import re
 import stat
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,8 +14,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.io.abaqus import read_abaqus
 from tissue.io.byte_reader import shown
 from tissue.io.gmsh import read_gmsh
+from tissue.io.medit import read_medit
+from tissue.io.mesh_file import MeshFile
+from tissue.io.nastran import read_nastran
+from tissue.io.tetgen import read_tetgen
 from tissue.io.vtk_legacy import read_vtk
 from tissue.io.vtu import read_vtu
 from tissue.io.vtu_writer import write_vtu
@@ -21,14 +28,37 @@ from tissue.mesh.mesh_arrays import MeshError, mesh_arrays
 from tissue.mesh.validation import checked
 from tissue.types import TetrahedralMesh
 
-__all__ = ["READERS", "MeshError", "mesh_from_arrays", "read_mesh", "write_vtu"]
+__all__ = ["MeshError", "mesh_from_arrays", "read_mesh", "write_vtu"]
 
-READERS: dict[str, Callable[[bytes], TetrahedralMesh]] = {
+_logger = logging.getLogger("tissue")
+
+_READERS: dict[str, Callable[[bytes], MeshFile]] = {
     ".msh": read_gmsh,
     ".vtk": read_vtk,
     ".vtu": read_vtu,
+    ".mesh": read_medit,
+    ".meshb": read_medit,
+    ".inp": read_abaqus,
+    ".bdf": read_nastran,
+    ".nas": read_nastran,
 }
-"""Reader of the files with each suffix."""
+"""Reader of the files with each suffix, where their first bytes do not show what they are."""
+
+_TETGEN = {".node": ".ele", ".ele": ".node"}
+"""Suffixes of TetGen's two files, and that of the other."""
+
+_BEGINNINGS: tuple[tuple[re.Pattern[bytes], Callable[[bytes], MeshFile]], ...] = (
+    (re.compile(rb"\s*\$(?:MeshFormat|NOD)\b"), read_gmsh),
+    (re.compile(rb"(?i)# vtk datafile"), read_vtk),
+    (re.compile(rb"\s*(?:<\?xml[^>]*>\s*(?:<!--.*?-->\s*)*)?<VTKFile\b", re.DOTALL), read_vtu),
+    (re.compile(rb"(?:\s*#[^\n]*\n)*\s*MeshVersionFormatted\b"), read_medit),
+    (re.compile(rb"(?i)(?:\s*\*\*[^\n]*\n)*\s*\*(?:HEADING|NODE|PART|PREPRINT)\b"), read_abaqus),
+    (re.compile(rb"(?i)(?:\s*\$[^\n]*\n)*\s*(?:SOL |CEND|BEGIN +BULK|GRID[*, ])"), read_nastran),
+)
+"""How the files of each format begin: what counts, whatever their suffix says."""
+
+SUFFIXES = (*_READERS, *_TETGEN)
+"""Suffixes of the files that are read."""
 
 SURFACE_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".vtp", ".gltf", ".glb", ".3mf")
 """Suffixes of files that hold surfaces only."""
@@ -45,32 +75,67 @@ millions of tetrahedra, too many to cut at an interactive rate."""
 def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMesh:
     """Read a tetrahedral mesh, and check it.
 
-    Reads Gmsh 1.0, 2.0 to 2.2 and 4.1 (`.msh`), VTK legacy (`.vtk`) and VTK XML (`.vtu`) files, as
-    text and binary. Points, lines and triangles in the file are ignored. From `RENUMBER_FROM`
-    tetrahedra on, nodes and tetrahedra are put in an order that the caches like
-    (`tissue.io.mesh_io`); the numbers are then not those of the file.
+    Reads Gmsh 1.0, 2.0 to 2.2 and 4.1 (`.msh`), VTK legacy (`.vtk`), VTK XML (`.vtu`), Medit
+    (`.mesh`, `.meshb`), TetGen (`.node` or `.ele`, the other beside it), Abaqus (`.inp`) and
+    Nastran (`.bdf`, `.nas`) files, as text and binary. What a file is shows by its content; where
+    that does not show it, by its suffix. Labels of tetrahedra, and their names, are read:
+    physical groups, cell data, references, attributes, element sets, properties.
+
+    Pyramids, wedges and hexahedra are divided into tetrahedra, and those of second order are
+    straightened; points, lines, triangles and sides of cells are ignored. What is made of a file
+    is said by the logger "tissue". From `RENUMBER_FROM` tetrahedra on, nodes and tetrahedra are put
+    in an order that the caches like (`tissue.io.mesh_io`); the numbers are then not those of the
+    file.
 
     Args:
         path: The file.
         scale: What the file's unit of length is in metres: 0.001 for millimetres.
 
     Raises:
-        MeshError: There is no such file, it is not what its suffix says, it holds no tetrahedra, or
-            the mesh is broken; see `tissue.mesh.validation.checked`, which also says what is
-            repaired.
+        MeshError: There is no such file, no mesh is found in it, or the mesh is broken; see
+            `tissue.mesh.validation.checked`, which also says what is repaired.
         ValueError: The scale is not a positive number.
     """
     _expect_scale(scale)
-    reader = _reader(Path(path))
-    data = _contents(Path(path))
-    try:
-        mesh = reader(data)
-    except MeshError as error:
-        raise MeshError(f"{path}: {_other_content(data) or error}") from None
+    found = read_mesh_file(path)
+    for remark in found.remarks:
+        _logger.warning("%s: %s", path, remark)
+    mesh = found.mesh
     mesh = checked(mesh._replace(positions=mesh.positions * scale), str(path)).mesh
     if len(mesh.tetrahedra) < RENUMBER_FROM:
         return mesh
     return renumbered(mesh)[0]
+
+
+def read_mesh_file(path: str | os.PathLike[str]) -> MeshFile:
+    """Return what is in the file of a mesh, which is not checked.
+
+    Raises:
+        MeshError: There is no such file, or no mesh is found in it.
+    """
+    place = Path(path)
+    suffix = place.suffix.lower()
+    if suffix in SURFACE_SUFFIXES:
+        raise MeshError(
+            f"{path}: {suffix} files hold only a surface, no tetrahedra. Fill it with tetrahedra "
+            f"first, with Gmsh or fTetWild for example, and give {' or '.join(SUFFIXES)}"
+        )
+    data = _contents(place)
+    begins = [reader for beginning, reader in _BEGINNINGS if beginning.match(data[:4096])]
+    try:
+        if begins:
+            return begins[0](data)
+        if suffix in _TETGEN:
+            other = _contents(place.with_suffix(_TETGEN[suffix]))
+            return read_tetgen(data, other) if suffix == ".node" else read_tetgen(other, data)
+        if suffix in _READERS:
+            return _READERS[suffix](data)
+    except MeshError as error:
+        raise MeshError(f"{path}: {_other_content(data) or error}") from None
+    raise MeshError(
+        f"{path}: expected a file ending in {', '.join(SUFFIXES)}, found '{suffix}'. "
+        f"`meshio convert {place.name} {place.stem}.vtu` converts many others"
+    )
 
 
 def mesh_from_arrays(
@@ -107,19 +172,6 @@ def _expect_scale(scale: float) -> None:
     """Refuse a scale that is no positive number."""
     if not math.isfinite(scale) or scale <= 0.0:
         raise ValueError(f"scale is {scale}; it must be finite and positive, 0.001 for millimetres")
-
-
-def _reader(path: Path) -> Callable[[bytes], TetrahedralMesh]:
-    """Return the reader of files with that suffix."""
-    suffix = path.suffix.lower()
-    if suffix in READERS:
-        return READERS[suffix]
-    if suffix in SURFACE_SUFFIXES:
-        raise MeshError(
-            f"{path}: {suffix} files hold only a surface, no tetrahedra. Fill it with tetrahedra "
-            f"first, with Gmsh or fTetWild for example, and give {' or '.join(READERS)}"
-        )
-    raise MeshError(f"{path}: expected a file ending in {', '.join(READERS)}, found '{suffix}'")
 
 
 def _contents(path: Path) -> bytes:

@@ -1,13 +1,19 @@
-"""VTK legacy files (`.vtk`) with an unstructured grid, text and binary, up to version 5.1."""
+"""VTK legacy files (`.vtk`) with an unstructured grid, text and binary, up to version 5.1.
+
+Labels are cell data, by the names in `label_arrays`.
+"""
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader, as_floats, as_ints, count_in, shown
-from tissue.io.cell_types import tetrahedra_of, uniform_records
-from tissue.types import TetrahedralMesh
+from tissue.io.cell_types import uniform_records
+from tissue.io.mesh_file import MeshFile, mesh_file
+from tissue.io.vtk_cells import cell_blocks, labels_among
 
 _DTYPES = {
     "char": ">i1",
@@ -29,13 +35,16 @@ _DTYPES = {
 }
 """VTK's names of types; binary files are big-endian on every computer."""
 
+_COMPONENTS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6}
+"""Numbers that each cell or node has of arrays that do not say so."""
+
 _NEXT_KEYWORD = re.compile(
     rb"(?i)\b(?:POINTS|CELLS|CELL_TYPES|OFFSETS|CONNECTIVITY|METADATA|FIELD|CELL_DATA|POINT_DATA)\b"
     rb"|\Z"
 )
 
 
-def read_vtk(data: bytes) -> TetrahedralMesh:
+def read_vtk(data: bytes) -> MeshFile:
     """Read a VTK legacy file; the mesh is not checked.
 
     Source: "VTK file formats" in the VTK documentation.
@@ -43,7 +52,7 @@ def read_vtk(data: bytes) -> TetrahedralMesh:
     Raises:
         MeshError: The bytes are not such a file, or it holds no tetrahedra.
     """
-    return _Reader(data).mesh()
+    return _Reader(data).file()
 
 
 class _Reader:
@@ -55,8 +64,9 @@ class _Reader:
         self._positions: FloatArray | None = None
         self._cells: tuple[IntArray, IntArray, IntArray] | None = None
         self._types: IntArray | None = None
+        self._remarks: list[str] = []
 
-    def mesh(self) -> TetrahedralMesh:
+    def file(self) -> MeshFile:
         """Read the header, then one part after another, until nodes and cells are there."""
         self._header()
         parts = {
@@ -79,7 +89,97 @@ class _Reader:
         starts, sizes, flat = self._cells
         if len(self._types) != len(starts):
             reader.fail(f"expected {len(starts)} types of cells, found {len(self._types)}")
-        return TetrahedralMesh(self._positions, tetrahedra_of(self._types, starts, sizes, flat))
+        arrays = self._cell_arrays(len(starts))
+        labels, said = labels_among(list(arrays), arrays.__getitem__)
+        blocks = cell_blocks(self._types, starts, sizes, flat, labels)
+        form = "binary" if self._is_binary else "text"
+        return mesh_file(
+            f"VTK legacy, {form}", self._positions, blocks, remarks=(*self._remarks, *said)
+        )
+
+    def _cell_arrays(self, n_cells: int) -> dict[str, npt.NDArray[np.generic]]:
+        """Read what follows the grid; return the cell data of one number for each cell."""
+        reader, of_cells, count = self._reader, False, 0
+        arrays: dict[str, npt.NDArray[np.generic]] = {}
+        while True:
+            reader.skip_blanks()
+            at = reader.at
+            words = reader.line().split()
+            keyword = words[0].upper() if words else ""
+            if not keyword:
+                return arrays
+            if keyword in ("CELL_DATA", "POINT_DATA"):
+                of_cells, count = keyword == "CELL_DATA", self._count(words, 1, "values", at)
+                if of_cells and count != n_cells:
+                    reader.fail(f"expected data of {n_cells} cells, found {count}", at)
+            elif keyword == "METADATA":
+                self._skip_metadata(words, at)
+            elif keyword == "FIELD":
+                for name, values in self._field(words, at):
+                    if of_cells and values.shape == (n_cells,):
+                        arrays[name] = values
+            elif keyword in ("SCALARS", *_COMPONENTS):
+                name, values = self._attribute(words, count, at)
+                if of_cells and values.shape == (n_cells,):
+                    arrays[name] = values
+            elif of_cells or not self._skips_point_data():
+                self._remarks.append(f"data from {shown(words[0])} on are left out")
+                return arrays
+
+    def _skips_point_data(self) -> bool:
+        """Go on to the cell data, and return whether there are some."""
+        match = re.compile(rb"(?m)^[ \t]*CELL_DATA\b").search(self._reader.data, self._reader.at)
+        if match:
+            self._reader.at = match.start()
+        return match is not None
+
+    def _attribute(
+        self, words: list[str], count: int, at: int
+    ) -> tuple[str, npt.NDArray[np.generic]]:
+        """Return name and numbers of scalars, vectors or tensors."""
+        if len(words) < 3:
+            self._reader.fail(f"expected name and type, found {shown(' '.join(words))}", at)
+        n = _COMPONENTS.get(words[0].upper(), 1)
+        if n == 1:
+            n = self._count(words, 3, "components", at) if len(words) > 3 else 1
+            table_at = self._reader.at
+            if not self._reader.line().upper().startswith("LOOKUP_TABLE"):
+                self._reader.at = table_at
+        return words[1], self._values(count, n, words[2], at)
+
+    def _field(self, words: list[str], at: int) -> Iterator[tuple[str, npt.NDArray[np.generic]]]:
+        """Yield names and numbers of the arrays of a field."""
+        for _ in range(self._count(words, 2, "arrays", at)):
+            reader = self._reader
+            reader.skip_blanks()
+            array_at = reader.at
+            array = reader.line().split()
+            if array[:1] == ["METADATA"]:
+                self._skip_metadata(array, array_at)
+                reader.skip_blanks()
+                array_at, array = reader.at, reader.line().split()
+            n = self._count(array, 1, "components", array_at)
+            count = self._count(array, 2, "values", array_at)
+            yield array[0], self._values(count, n, " ".join(array[3:4]), array_at)
+
+    def _values(self, count: int, n: int, dtype: str, at: int) -> npt.NDArray[np.generic]:
+        """Return the numbers of an array: shape (count,), or (count, n) where n is not 1.
+
+        Of text there is one line for each; it is skipped.
+        """
+        reader = self._reader
+        if dtype.lower() == "string":
+            for _ in range(count * n):
+                reader.line()
+            return np.zeros(0)
+        code = self._dtype([dtype], 0, at)
+        shape = (count,) if n == 1 else (count, n)
+        if self._is_binary:
+            return reader.binary(count * n, code, "values").reshape(shape)
+        end = reader.after_words(count * n, "values")
+        is_whole = code[1] in "iu"
+        numbers = reader.ints(end, "whole numbers") if is_whole else reader.floats(end, "numbers")
+        return numbers.reshape(shape)
 
     def _header(self) -> None:
         reader = self._reader

@@ -1,4 +1,7 @@
-"""VTK unstructured grids in XML (`.vtu`) with numbers as text, in base 64 or appended."""
+"""VTK unstructured grids in XML (`.vtu`) with numbers as text, in base 64 or appended.
+
+Labels are cell data, by the names in `label_arrays`.
+"""
 
 import base64
 import binascii
@@ -13,9 +16,9 @@ import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader, as_floats, as_ints, shown
-from tissue.io.cell_types import tetrahedra_of
+from tissue.io.mesh_file import MeshFile, mesh_file
+from tissue.io.vtk_cells import cell_blocks, labels_among
 from tissue.mesh.mesh_arrays import MeshError
-from tissue.types import TetrahedralMesh
 
 MAX_RATIO = 100
 """Bytes in memory per byte of the file at most. Grids, the meshes that compress best, have 8 with
@@ -64,7 +67,7 @@ class Encoding(NamedTuple):
     """Whether the appended data is in binary, not in base 64."""
 
 
-def read_vtu(data: bytes) -> TetrahedralMesh:
+def read_vtu(data: bytes) -> MeshFile:
     """Read a `.vtu` file; the mesh is not checked.
 
     Source: "VTK XML file formats" in the VTK documentation.
@@ -85,7 +88,7 @@ def read_vtu(data: bytes) -> TetrahedralMesh:
     pieces = root.findall("UnstructuredGrid/Piece")
     if len(pieces) != 1:
         raise MeshError(f"expected one <Piece>, found {len(pieces)}: merge them into one grid")
-    return _Piece(pieces[0], _encoding(root, appended), len(data)).mesh()
+    return _Piece(pieces[0], _encoding(root, appended), len(data)).file()
 
 
 def _apart(data: bytes) -> tuple[bytes, bytes]:
@@ -136,7 +139,7 @@ class _Piece:
         self._most = min(MAX_RATIO * n_bytes, MAX_BYTES) // _NUMBER_BYTES
         self._n_numbers = 0
 
-    def mesh(self) -> TetrahedralMesh:
+    def file(self) -> MeshFile:
         n_nodes, n_cells = self._count("NumberOfPoints"), self._count("NumberOfCells")
         positions = self._floats("Points/DataArray", 3 * n_nodes).reshape(n_nodes, 3)
         ends = self._ints("Cells/DataArray[@Name='offsets']", n_cells)
@@ -144,7 +147,20 @@ class _Piece:
         n_entries = int(ends[-1]) if n_cells else 0
         flat = self._ints("Cells/DataArray[@Name='connectivity']", n_entries)
         starts = np.concatenate([[0], ends])[:-1]
-        return TetrahedralMesh(positions, tetrahedra_of(types, starts, ends - starts, flat))
+        labels, said = self._labels(n_cells)
+        blocks = cell_blocks(types, starts, ends - starts, flat, labels)
+        return mesh_file("VTK XML", positions, blocks, remarks=said)
+
+    def _labels(self, n_cells: int) -> tuple[IntArray | None, list[str]]:
+        """Return the labels among the cell data, and what is to be said of them."""
+        arrays = {
+            each.get("Name", ""): each
+            for each in self._element.findall("CellData/DataArray")
+            if each.get("NumberOfComponents", "1").strip() == "1"
+        }
+        return labels_among(
+            list(arrays), lambda name: self._numbers(arrays[name], n_cells, f"cell data '{name}'")
+        )
 
     def _count(self, attribute: str) -> int:
         text = self._element.get(attribute, "")
@@ -165,14 +181,17 @@ class _Piece:
         return as_ints(values)
 
     def _decoded(self, path: str, count: int) -> npt.NDArray[np.generic]:
+        return self._numbers(self._array(path), count, path)
+
+    def _numbers(self, array: ET.Element, count: int, name: str) -> npt.NDArray[np.generic]:
         """Return the `count` numbers of an array, if there is room for them."""
         self._n_numbers += count
         if not 0 <= count <= self._n_numbers <= self._most:
             raise MeshError(
-                f"{path}: {count} numbers, with those before {self._n_numbers}; expected at most "
+                f"{name}: {count} numbers, with those before {self._n_numbers}; expected at most "
                 f"{self._most} from a file of this size. If it is a mesh, save it uncompressed"
             )
-        return decoded(self._array(path), self._encoding, count, path)
+        return decoded(array, self._encoding, count, name)
 
     def _array(self, path: str) -> ET.Element:
         element = self._element.find(path)

@@ -114,7 +114,8 @@ def test_entities_are_refused_in_any_encoding(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (b"24", "tetrahedra with 10 nodes"),
+        (b"24", "cell 3 is one of the tetrahedra with 10 nodes and has 4 nodes, not 10"),
+        (b"14", "cell 3 is one of the pyramids and has 4 nodes, not 5"),
         (b"5", "cell 3 is one of the triangles and has 4 nodes, not 3"),
         (b"9", "cell 3, one of the quadrangles, has 4 nodes: besides tetrahedra there may be"),
         (b"8", "cell 3, one of the pixels, has 4 nodes"),
@@ -148,14 +149,14 @@ def test_offsets_that_end_before_the_nodes_do_are_refused(tmp_path):
     ("kind", "message"),
     [
         (b"2", "(triangles): expected 8 numbers on its line, found 9"),
-        (b"3", "an element, one of the quadrangles, has 4 nodes"),
-        (b"26", "an element, one of the lines with 4 nodes, has 4 nodes"),
+        (b"3", "cell 5, one of the quadrangles, has 4 nodes"),
+        (b"26", "cell 5, one of the lines with 4 nodes, has 4 nodes"),
         (b"11", "(tetrahedra with 10 nodes): expected 15 numbers on its line, found 9"),
         (b"77", "expected a type of element that Gmsh knows, found 77"),
     ],
 )
 def test_a_gmsh_tetrahedron_under_another_type_is_refused_and_not_lost(kind, message, tmp_path):
-    data = FILES["gmsh 2.2 .msh"].replace(b"\n5 4 2 1 1 ", b"\n5 %b 2 1 1 " % kind)
+    data = FILES["gmsh 2.2 .msh"].replace(b"\n5 4 2 0 1 ", b"\n5 %b 2 0 1 " % kind)
     assert message in refusal_of(tmp_path, "a.msh", data)
 
 
