@@ -72,7 +72,7 @@ _STEEL = {
 _TRAY = {**_STEEL, "color": 0x8B949A, "finish": "brushed"}
 """Properties of the material of the tray."""
 
-_CLOTH = {"color": 0x5A8C85, "specular": 0x0A0A0A, "shininess": 8}
+_CLOTH = {"color": 0x5A8C85, "specular": 0x0A0A0A, "shininess": 8, "finish": "cloth"}
 """Properties of the material of a drape: the green of operating theatres, beside which tissue is
 red."""
 

@@ -11,6 +11,8 @@ const POLISHED = { roughness: 0.24, metalness: 1, envMapIntensity: 1.7 };
 const BRUSHED = { roughness: 0.42, metalness: 1, envMapIntensity: 0.75 };
 const FINISHES = { wet: WET, steel: POLISHED, brushed: BRUSHED };
 
+const CLOTH_MEAN = 0.75; // of the texture of cloth, linear
+
 // `redraw` is called when a texture has been read.
 function materialOf(kind, { finish, ...properties }, maps, room, redraw) {
     const material = new THREE[kind]({ ...properties, side: THREE.DoubleSide });
@@ -49,6 +51,10 @@ function plainOf(material) {
         plain[property] = material[property];
     }
     plain.color.copy(material.color);
+    if (material.userData.finish === "cloth") { // it covers half of a window
+        plain.map = null;
+        plain.color.multiplyScalar(CLOTH_MEAN);
+    }
     if (material.emissive) plain.emissive.copy(material.emissive);
     return plain;
 }
