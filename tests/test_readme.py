@@ -31,6 +31,7 @@ HELPS = (
     "materials",
     "figure",
     "new",
+    "mesh",
     "warm-up",
     "validate",
     "bench peers",

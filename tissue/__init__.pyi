@@ -32,6 +32,7 @@ from .integrators.methods import Hierarchical as Hierarchical
 from .integrators.methods import Verlet as Verlet
 from .io.mesh_io import mesh_from_arrays as mesh_from_arrays
 from .io.mesh_io import read_mesh as read_mesh
+from .io.mesh_io import write_mesh as write_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .laws import LAWS as LAWS
 from .laws.exponential import Exponential as Exponential
@@ -166,5 +167,6 @@ __all__ = [
     "read_mesh",
     "spring_error",
     "toughness_law_of",
+    "write_mesh",
     "write_vtu",
 ]

@@ -14,6 +14,9 @@ from .io.whole_file import new_whole_file as new_whole_file
 from .io.whole_file import remove_unfinished as remove_unfinished
 from .io.whole_file import whole_file as whole_file
 from .mesh.pieces import components as components
+from .mesh.validation import quality as quality
+from .mesh.validation import signed_volumes as signed_volumes
+from .shapes.labelled_stuffing import stuff_labels as stuff_labels
 from .state.tissue_state import Around as Around
 
 __all__ = [
@@ -31,7 +34,10 @@ __all__ = [
     "kernel",
     "n_compiled_kernels",
     "new_whole_file",
+    "quality",
     "remove_unfinished",
+    "signed_volumes",
+    "stuff_labels",
     "whole_file",
     "write_bundle",
 ]

@@ -12,6 +12,7 @@ from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.cli.crtk_command import crtk
 from scalpel_sim.cli.doctor_command import doctor
 from scalpel_sim.cli.explain_command import explain
+from scalpel_sim.cli.mesh_command import mesh
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
     ArmOptions,
@@ -226,6 +227,7 @@ app.command(doctor)
 app.command(bench)
 app.command(figure)
 app.command(new)
+app.command(mesh)
 app.command(validate)
 
 

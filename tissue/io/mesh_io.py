@@ -23,12 +23,12 @@ from tissue.io.nastran import read_nastran
 from tissue.io.tetgen import read_tetgen
 from tissue.io.vtk_legacy import read_vtk
 from tissue.io.vtu import read_vtu
-from tissue.io.vtu_writer import write_vtu
+from tissue.io.vtu_writer import write_mesh, write_vtu
 from tissue.mesh.mesh_arrays import MeshError, mesh_arrays
 from tissue.mesh.validation import checked
 from tissue.types import TetrahedralMesh
 
-__all__ = ["MeshError", "mesh_from_arrays", "read_mesh", "write_vtu"]
+__all__ = ["MeshError", "mesh_from_arrays", "read_mesh", "write_mesh", "write_vtu"]
 
 _logger = logging.getLogger("tissue")
 
@@ -118,7 +118,7 @@ def read_mesh_file(path: str | os.PathLike[str]) -> MeshFile:
     if suffix in SURFACE_SUFFIXES:
         raise MeshError(
             f"{path}: {suffix} files hold only a surface, no tetrahedra. Fill it with tetrahedra "
-            f"first, with Gmsh or fTetWild for example, and give {' or '.join(SUFFIXES)}"
+            f"first: scalpel-sim mesh {path}"
         )
     data = _contents(place)
     begins = [reader for beginning, reader in _BEGINNINGS if beginning.match(data[:4096])]

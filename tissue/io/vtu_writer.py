@@ -18,6 +18,9 @@ from tissue.types import Deformation, Snapshot, TetrahedralMesh
 VTK_TETRA = 10
 """VTK's number for a tetrahedron with four nodes."""
 
+_Arrays = list[tuple[str, npt.NDArray[np.generic], str]]
+"""Data of nodes or tetrahedra: a name, the values, and the type in the file."""
+
 _TYPE_NAMES = {"f4": "Float32", "f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
@@ -55,16 +58,54 @@ def write_vtu(
         raise ValueError(
             f"the stress is that of {n_given} tetrahedra, and the body has {len(mesh.tetrahedra)}"
         )
+    points: _Arrays = [
+        ("rest_position", snapshot.rest_positions, "f8"),
+        ("velocity", snapshot.velocities, "f8"),
+        ("mass", snapshot.masses, "f8"),
+        ("fixed", snapshot.fixed, "u1"),
+    ]
+    cells: _Arrays = [("piece", piece_of_tetrahedra(snapshot), "i8"), *_labels(mesh)]
+    if deformation is not None:
+        cells.append(("stress", deformation.stress.reshape(-1, 9), "f4"))
+        cells.append(("strain", deformation.strain.reshape(-1, 9), "f4"))
+        cells.append(("von_mises", deformation.von_mises(), "f4"))
+    _write(path, mesh, points, cells)
+
+
+def write_mesh(path: str | os.PathLike[str], mesh: TetrahedralMesh) -> None:
+    """Write a mesh to `path`, as `read_mesh` takes it; labels are the cell data `label`.
+
+    Numbers keep all their bits. The file appears under its name only when it is complete.
+
+    Args:
+        path: The file.
+        mesh: The mesh.
+
+    Raises:
+        MeshError: Positions, tetrahedra or labels have another shape or hold no such numbers.
+        OSError: The file cannot be written.
+    """
+    mesh = mesh_arrays(mesh)
+    _write(path, mesh, [], _labels(mesh))
+
+
+def _labels(mesh: TetrahedralMesh) -> _Arrays:
+    """Return the labels of a mesh as cell data."""
+    return [] if mesh.labels is None else [("label", mesh.labels, "i8")]
+
+
+def _write(
+    path: str | os.PathLike[str], mesh: TetrahedralMesh, points: _Arrays, cells: _Arrays
+) -> None:
+    """Write a mesh with the data of its nodes and of its tetrahedra."""
     with whole_file(path) as unfinished, unfinished.open("wb") as file:
-        for line in _lines(snapshot, deformation, mesh.labels):
+        for line in _lines(mesh, points, cells):
             file.write(line.encode("ascii") + b"\n")
 
 
-def _lines(
-    snapshot: Snapshot, deformation: Deformation | None, labels: IntArray | None
-) -> Iterator[str]:
+def _lines(mesh: TetrahedralMesh, points: _Arrays, cells: _Arrays) -> Iterator[str]:
     """Yield the lines of the file."""
-    n_tets = len(snapshot.tetrahedra)
+    n_tets = len(mesh.tetrahedra)
     byte_order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
     yield '<?xml version="1.0"?>'
     yield (
@@ -72,30 +113,20 @@ def _lines(
         'header_type="UInt64">'
     )
     yield "<UnstructuredGrid>"
-    yield f'<Piece NumberOfPoints="{len(snapshot.positions)}" NumberOfCells="{n_tets}">'
+    yield f'<Piece NumberOfPoints="{len(mesh.positions)}" NumberOfCells="{n_tets}">'
     yield "<Points>"
-    yield from _data_array("Points", snapshot.positions, "f8")
+    yield from _data_array("Points", mesh.positions, "f8")
     yield "</Points>"
     yield "<Cells>"
-    yield from _data_array("connectivity", snapshot.tetrahedra.ravel(), "i8")
+    yield from _data_array("connectivity", mesh.tetrahedra.ravel(), "i8")
     yield from _data_array("offsets", 4 * np.arange(1, n_tets + 1), "i8")
     yield from _data_array("types", np.full(n_tets, VTK_TETRA), "u1")
     yield "</Cells>"
-    yield "<PointData>"
-    yield from _data_array("rest_position", snapshot.rest_positions, "f8")
-    yield from _data_array("velocity", snapshot.velocities, "f8")
-    yield from _data_array("mass", snapshot.masses, "f8")
-    yield from _data_array("fixed", snapshot.fixed, "u1")
-    yield "</PointData>"
-    yield "<CellData>"
-    yield from _data_array("piece", piece_of_tetrahedra(snapshot), "i8")
-    if labels is not None:
-        yield from _data_array("label", labels, "i8")
-    if deformation is not None:
-        yield from _data_array("stress", deformation.stress.reshape(-1, 9), "f4")
-        yield from _data_array("strain", deformation.strain.reshape(-1, 9), "f4")
-        yield from _data_array("von_mises", deformation.von_mises(), "f4")
-    yield "</CellData>"
+    for section, arrays in (("PointData", points), ("CellData", cells)):
+        yield f"<{section}>"
+        for name, values, dtype in arrays:
+            yield from _data_array(name, values, dtype)
+        yield f"</{section}>"
     yield "</Piece>"
     yield "</UnstructuredGrid>"
     yield "</VTKFile>"

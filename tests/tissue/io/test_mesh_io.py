@@ -8,7 +8,7 @@ import pytest
 from tests.support import bodies
 from tests.tissue.io import mesh_writers
 from tests.tissue.io import mesh_writers as write
-from tissue import Snapshot, TetrahedralMesh, Tissue, block, read_mesh, write_vtu
+from tissue import Snapshot, TetrahedralMesh, Tissue, block, read_mesh, write_mesh, write_vtu
 from tissue.boundary_conditions import side_nodes
 from tissue.io import mesh_io
 from tissue.io.mesh_io import renumbered
@@ -439,3 +439,13 @@ def test_a_large_body_is_renumbered_as_it_is_read(tmp_path, monkeypatch):
 def test_tetrahedra_are_sorted_by_their_nodes():
     lowest = renumbered(shuffled(bodies.jittered(4, 0)))[0].tetrahedra.min(axis=1)
     assert (np.diff(lowest) >= 0).all()
+
+
+def test_a_mesh_is_written_as_it_is_read(tmp_path):
+    mesh = bodies.jittered(3, 0)._replace(labels=np.arange(174) % 4)
+    write_mesh(tmp_path / "mesh.vtu", mesh)
+    again = read_mesh(tmp_path / "mesh.vtu")
+    np.testing.assert_array_equal(again.positions, mesh.positions)
+    np.testing.assert_array_equal(again.tetrahedra, mesh.tetrahedra)
+    (labels,) = meshio.read(tmp_path / "mesh.vtu").cell_data["label"]
+    np.testing.assert_array_equal(labels, mesh.labels)

@@ -4,7 +4,16 @@ import pytest
 from tests.tissue.geometry_of_meshes import dihedral_angles
 from tissue.mesh.faces import boundary_faces
 from tissue.mesh.validation import checked, signed_volumes
-from tissue.shapes.isosurface_stuffing import stuff
+from tissue.shapes.isosurface_stuffing import (
+    ALPHA_LONG,
+    ALPHA_SHORT,
+    bisected,
+    checked_box,
+    edges_between,
+    lattice_of,
+    moved_to_surface,
+    stuff,
+)
 
 BOX = [[-0.05] * 3, [0.05] * 3]
 
@@ -64,3 +73,32 @@ def test_the_volume_converges_with_the_square_of_the_spacing():
 def test_an_impossible_shape_is_refused_with_the_reason(arguments, message):
     with pytest.raises(ValueError, match=message):
         stuff(*arguments)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_points_are_moved_as_if_in_turn(seed):
+    rng = np.random.default_rng(seed)
+    shape = stretched_ball(rng.uniform(1.0, 1.5, 3))
+    lattice = lattice_of(*checked_box(BOX, 0.008), 0.008)
+    signs = np.sign(shape(lattice.points)).astype(np.int64)
+    edges = edges_between(lattice.tetrahedra(), signs)
+    ends = lattice.points[np.where((signs[edges[:, 0]] > 0)[:, None], edges, edges[:, ::-1])]
+    cuts = bisected(shape, ends[:, 0], ends[:, 1])
+    moved = moved_to_surface(lattice.points, signs, edges, cuts)
+    points, is_cut = moved_in_turn(lattice.points, edges, cuts)
+    np.testing.assert_array_equal(moved.points, points)
+    np.testing.assert_array_equal(moved.is_cut, is_cut)
+
+
+def moved_in_turn(points, edges, cuts):
+    points, before, is_cut = points.copy(), points, np.ones(len(edges), dtype=bool)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    limits = np.where(lengths > 0.95 * lengths.max(), ALPHA_LONG, ALPHA_SHORT) * lengths
+    for node in np.unique(edges):
+        of_node = np.flatnonzero((edges == node).any(axis=1) & is_cut)
+        ways = np.linalg.norm(cuts[of_node] - before[node], axis=1)
+        near = ways < limits[of_node]
+        if near.any():
+            points[node] = cuts[of_node[near][np.argmin(ways[near])]]
+            is_cut[of_node] = False
+    return points, is_cut

@@ -1,0 +1,1 @@
+"""Tetrahedra from the files that people have: surfaces, label volumes, meshes to be repaired."""
