@@ -56,6 +56,8 @@ from .material_presets import SourcedValue as SourcedValue
 from .mesh.faces import boundary_faces as boundary_faces
 from .mesh.mesh_arrays import MeshError as MeshError
 from .mesh.pieces import pieces_of as pieces_of
+from .mesh.rigid_cores import CoreCutError as CoreCutError
+from .mesh.rigid_cores import CoreMotion as CoreMotion
 from .shapes.block import block as block
 from .shapes.block import lattice_block as lattice_block
 from .shapes.cylinder import cylinder as cylinder
@@ -94,6 +96,8 @@ __all__ = [
     "BoolArray",
     "CUT_COLOUR",
     "Chunks",
+    "CoreCutError",
+    "CoreMotion",
     "CutReport",
     "CutSettings",
     "DAMPING_BAND",

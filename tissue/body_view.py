@@ -16,6 +16,7 @@ from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
+from tissue.mesh.rigid_cores import CoreMotion
 from tissue.mesh.surface import boundary_nodes, boundary_surface
 from tissue.types import Chunks, Deformation, Piece, Snapshot, Surface, SurfaceQuantity
 
@@ -177,6 +178,11 @@ class BodyView:
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
         return n_pieces_of(self._body)
+
+    @property
+    def cores(self) -> tuple[CoreMotion, ...]:
+        """Return where each rigid core is now and how it moves, in the order they were made."""
+        return self._model.cores.motions(self._body)
 
     def pieces(self) -> tuple[Piece, ...]:
         """Return the connected pieces and their mass properties, the largest at rest first."""

@@ -295,6 +295,35 @@ class Tissue(BodyView):
         self._stages.handles.expect_all_nodes_move("supports do not move")
         self._steps.begin_change().handles.lead_supports(where, path)
 
+    def make_rigid(self, where: str | npt.ArrayLike, *, density: float | None = None) -> int:
+        """Make a region one rigid body from now on, such as a bone or a stone; return its number.
+
+        It is made of the tetrahedra of which all nodes are in the region, keeps the shape that they
+        have now, and turns and moves with what acts on its nodes. The blade does not cut it. The
+        account of energy begins again. `cores` says where it is.
+
+        Args:
+            where: A region as text (`fixed_nodes`), or as a mask, shape (n_nodes,).
+            density: [kg/m3], at least that of the tissue; None: the same.
+
+        Raises:
+            ValueError: no tetrahedron is there, one of its nodes is fixed, on the skin or in
+                another core, the density is too low, or the relaxation is `hierarchical`.
+        """
+        self._stages.handles.expect_all_nodes_move("cores do not move")
+        own = self.material.density
+        if density is not None and not own <= density < math.inf:
+            raise ValueError(
+                f"density is {density} kg/m3; a core is at least as dense as the tissue, "
+                f"{own:g} kg/m3: the steps of the integrator are chosen for that"
+            )
+        added = 0.0 if density is None else density - own
+        stages = self._steps.begin_change()
+        core = stages.handles.make_rigid(where, added)
+        stages.global_stepper.wake()
+        stages.audit.begin(stages.context, stages.model.interaction.edge_now[0])
+        return core
+
     def support_forces(self) -> FloatArray:
         """Return the force of the supports on each fixed node now [N], shape (n_nodes, 3).
 

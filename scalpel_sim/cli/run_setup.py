@@ -57,6 +57,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "blade",
         "audit",
         "attachments",
+        "cores",
         "supports",
     }
 )

@@ -1,6 +1,7 @@
 """The table that a run prints. `bench table1` compares with the paper's figures."""
 
 from collections.abc import Iterator
+from math import degrees
 from typing import Any
 
 from rich.console import Console
@@ -195,6 +196,10 @@ def _cut(summary: Summary) -> _Rows:
     for number, each in enumerate(summary.strokes, 1):
         how = f"{each['ended']}, {each['time_s']:.3f} s, {each['force_n']:.3g} N"
         yield f"stroke {number}, {each['kind']}", how
+    for number, each in enumerate(summary.cores, 1):
+        if each["moved_m"] is not None:
+            how = f"moved by {1e3 * each['moved_m']:.3g} mm, turned by"
+            yield f"core {number}, {each['where']}", f"{how} {degrees(each['turned_rad']):.3g}°"
     for number, each in enumerate(summary.attachments, 1):
         name = f"attachment {number}" + (f", {each['where']}" if each["where"] else "")
         peak, end = each["force_peak_n"], each["force_at_end_n"]

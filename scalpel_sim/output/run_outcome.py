@@ -23,6 +23,7 @@ from tissue import (
     Snapshot,
     TetrahedralMesh,
     boundary_faces,
+    fixed_nodes,
     pieces_of,
     toughness_law_of,
 )
@@ -188,14 +189,27 @@ class RunOutcome:
         ends = np.stack([np.repeat(last.tetrahedra[:, 0], 3), last.tetrahedra[:, 1:].ravel()], 1)
         _, label = components(len(last.positions), ends)
         kept = np.flatnonzero(label[:n] == np.bincount(label[:n]).argmax())
-        masses = self.first.masses[kept, None] / self.first.masses[kept].sum()
-        before, after = self.first.positions[kept], last.positions[kept]
-        centres = (masses * before).sum(axis=0), (masses * after).sum(axis=0)
-        # Kabsch 1976, Acta Cryst. A32:922.
-        left, _, right = np.linalg.svd((masses * (before - centres[0])).T @ (after - centres[1]))
-        mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-        cosine = 0.5 * (float(np.trace(left @ mirror @ right)) - 1.0)
-        return float(np.linalg.norm(centres[1] - centres[0])), float(np.arccos(min(cosine, 1.0)))
+        return _rigid_motion(
+            self.first.masses[kept], self.first.positions[kept], last.positions[kept]
+        )
+
+    @property
+    def motion_of_cores(self) -> list[tuple[float, float] | None]:
+        """Path [m] and turn [rad] of each rigid core; None where they are not known."""
+        found: list[tuple[float, float] | None] = []
+        mesh = TetrahedralMesh(self.first.rest_positions, self.first.tetrahedra)
+        for row in self.settings.get("cores", []):
+            if self.last is None:
+                found.append(None)
+                continue
+            is_inside = fixed_nodes(mesh, row["where"])
+            core = np.flatnonzero(is_inside[mesh.tetrahedra].all(axis=1))
+            before, after = (
+                body.positions[body.tetrahedra[core]].reshape(-1, 3)
+                for body in (self.first, self.last)
+            )
+            found.append(_rigid_motion(np.ones(len(before)), before, after))
+        return found
 
     @property
     def motion_of_supports(self) -> float:
@@ -310,3 +324,20 @@ def outcome_of(
         stroke_ends=() if simulation.blade.progress is None else simulation.blade.progress.ends,
         held_points=[load.n_points for load in bridge.frame_loads],
     )
+
+
+def _rigid_motion(masses: FloatArray, before: FloatArray, after: FloatArray) -> tuple[float, float]:
+    """Return how far points have moved [m] and turned [rad] as a rigid body.
+
+    Args:
+        masses: Their weights, shape (n,).
+        before: Where they were [m], shape (n, 3).
+        after: Where they are [m], shape (n, 3).
+    """
+    shares = masses[:, None] / masses.sum()
+    centres = (shares * before).sum(axis=0), (shares * after).sum(axis=0)
+    # Kabsch 1976, Acta Cryst. A32:922.
+    left, _, right = np.linalg.svd((shares * (before - centres[0])).T @ (after - centres[1]))
+    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    cosine = 0.5 * (float(np.trace(left @ mirror @ right)) - 1.0)
+    return float(np.linalg.norm(centres[1] - centres[0])), float(np.arccos(min(cosine, 1.0)))

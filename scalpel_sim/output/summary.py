@@ -82,6 +82,8 @@ class Summary(NamedTuple):
     strokes: list[dict[str, Any]]
     """End of each stroke, and its time, where a force or the body could end it: `kind`, `ended`,
     `time_s`, `force_n`."""
+    cores: list[dict[str, Any]]
+    """Of each rigid core: how far it has moved and turned from the first frame to the last."""
     attachments: list[dict[str, Any]]
     """Of each attachment: what it held, how many points in the end, and its forces."""
     work_of_blade_j: float
@@ -138,6 +140,7 @@ def summarise(outcome: RunOutcome, warnings: Iterable[RunWarning] = ()) -> Summa
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
         strokes=_strokes(outcome),
+        cores=_cores(outcome),
         attachments=_attachments(outcome),
         work_of_blade_j=work,
         energies_j=energies,
@@ -186,6 +189,15 @@ def _strokes(outcome: RunOutcome) -> list[dict[str, Any]]:
         kind = rows[i]["kind"] if i < len(rows) else ""
         felt = float(force[frame]) if frame < len(force) else 0.0
         found.append({"kind": kind, "ended": end.how, "time_s": end.time, "force_n": felt})
+    return found
+
+
+def _cores(outcome: RunOutcome) -> list[dict[str, Any]]:
+    """Return the figures of the rigid cores."""
+    found: list[dict[str, Any]] = []
+    for row, motion in zip(outcome.settings.get("cores", []), outcome.motion_of_cores, strict=True):
+        moved, turned = (None, None) if motion is None else motion
+        found.append({"where": row["where"], "moved_m": moved, "turned_rad": turned})
     return found
 
 

@@ -87,6 +87,10 @@ def make_tissue(scene: Scene) -> Tissue:
     table = tabletop_of(scene, tissue.bounds)
     if table is not None:
         tissue.collide_with([table.geom], [table.centre])
+    for i, core in enumerate(scene.cores):
+        naming_table(
+            f"[[core]] number {i + 1}", partial(tissue.make_rigid, core.where, density=core.density)
+        )
     attachments = _attached(tissue, scene.attachments)
     if fixed.any() or table is not None or attachments:
         tissue.settle()

@@ -28,6 +28,7 @@ from scalpel_sim.scene.schema import (
     ArmTable,
     AttachmentTable,
     BladeTable,
+    CoreTable,
     GrasperTable,
     LedSupportTable,
     PresetMaterialTable,
@@ -80,6 +81,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """The arm, and how it is coupled to the tissue."""
     attachments: tuple[AttachmentTable, ...] = field(default=(), name="attachment")
     """Attachments that hold the tissue besides the fixed nodes."""
+    cores: tuple[CoreTable, ...] = field(default=(), name="core")
+    """Rigid cores inside the tissue."""
     supports: tuple[LedSupportTable, ...] = field(default=(), name="support")
     """Held sides that move."""
     graspers: tuple[GrasperTable, ...] = field(default=(), name="grasper")
@@ -171,6 +174,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "blade": None if self.blade is None else asdict(self.blade),
             "audit": solver.audit,
             "attachments": [given_in(attachment) for attachment in self.attachments],
+            "cores": [given_in(core) for core in self.cores],
             "supports": [given_in(support) for support in self.supports],
             "strokes": [given_in(stroke) for stroke in self.strokes],
             "arm": arm.preset,

@@ -268,6 +268,15 @@ class AttachmentTable(TomlTable, kw_only=True, frozen=True):
     """When it releases the tissue [s]."""
 
 
+class CoreTable(TomlTable, kw_only=True, frozen=True):
+    """`[[core]]`: a rigid core inside the tissue, such as a bone or a stone."""
+
+    where: Region
+    """Region, as for `fixed`: the core is made of the elements that are wholly in it."""
+    density: Positive | None = None
+    """Density, at least that of the tissue, and the same without [kg/m3]."""
+
+
 class LedSupportTable(TomlTable, kw_only=True, frozen=True):
     """`[[support]]`: held nodes that are led: moved, turned and stretched over time."""
 

@@ -61,6 +61,8 @@ class Anchors(Arrays):
     """Whether the anchor has cut since it was set, shape (n,)."""
     at_skin: BoolArray
     """Whether the anchor is at the skin, which the edge has yet to break; shape (n,)."""
+    at_core: BoolArray
+    """Whether a rigid core holds the anchor, which does not slip then; shape (n,)."""
     is_new: BoolArray
     """Whether the anchor was set since the path was traced last; shape (n,)."""
     pulls: BoolArray
@@ -136,6 +138,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         coarse=new_coarse_hold(n),
         slipped=np.zeros(n, dtype=np.bool_),
         at_skin=np.zeros(n, dtype=np.bool_),
+        at_core=np.zeros(n, dtype=np.bool_),
         is_new=np.zeros(n, dtype=np.bool_),
         pulls=np.zeros(n, dtype=np.bool_),
         offset=np.zeros(n),
@@ -227,7 +230,8 @@ def surplus_stretch(
 ) -> Vec3:
     """Return the part of an anchor's stretch that is beyond its yield limit [m].
 
-    The surplus is in the plane of the blade, along the stretch; zero below the limit.
+    The surplus is in the plane of the blade, along the stretch; zero below the limit, and where a
+    rigid core holds the anchor.
 
     Args:
         anchors: The samples.
@@ -238,7 +242,7 @@ def surplus_stretch(
     """
     in_plane = axpy(-dot(stretch, pose.normal), pose.normal, stretch)
     distance = norm(in_plane)
-    if distance == 0.0 or dot(stretch, pose.forward) < 0.0:
+    if distance == 0.0 or dot(stretch, pose.forward) < 0.0 or anchors.at_core[k]:
         return scale(0.0, stretch)
     across = dot(in_plane, pose.forward) / distance
     surplus = distance - held_toughness(anchors, k, law) * across / anchors.modulus

@@ -250,6 +250,7 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     anchors.rest_share[k] = 1.0
     store(anchors.rest_area, k, Vec3(0.0, 0.0, 0.0))
     anchors.at_skin[k] = at_skin
+    anchors.at_core[k] = False
 
 
 @kernel

@@ -15,6 +15,7 @@ from tissue.blade.coarse_hold import (
     move_coarse_hold,
     store_weights,
 )
+from tissue.blade.core_wall import hold_at_core
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
 from tissue.blade.edge_anchors import (
     ANCHORED,
@@ -232,6 +233,8 @@ def slip_anchors(
         if not anchors.pulls[k]:
             totals.released += energy_given(anchors, k, stretch, pose, law, seconds)
             totals.released -= stored_energy(anchors, k, stretch, pose, law)
+        if body.n_rigid > 0:
+            hold_at_core(blade, body, k, stretch, pose)
         _slip_anchor(blade, body, visits, k, a, stretch, pose)
         if not anchors.slips[k]:
             begin_account(anchors, k, stretch, pose)

@@ -20,6 +20,9 @@ from tissue.mesh.star import Visits
 ROUNDED_AREA = 1e-9
 """Share of a face's area below which what is left of its capacity is rounding."""
 
+OF_CORE = 1e6
+"""Capacity of a face within a rigid core over its area: more than any cut that is made."""
+
 
 class FlowGraph(Arrays):
     """The flow between two lips. Without terminals all entries are 0 and nothing is stored."""
@@ -110,6 +113,8 @@ def _clear_flow(graph: FlowGraph) -> None:
 def _left(graph: FlowGraph, body: Body, t: int, f: int) -> float:
     """Return the capacity left from `t` through its face `f` [m2], 0 where it is only rounding."""
     area = face_area(body.rest, body.tetrahedra, t, f)
+    if body.n_rigid > 0 and body.is_rigid[t] and body.is_rigid[body.links[t, f] // 4]:
+        area *= OF_CORE
     left = area - graph.flow[t, f]
     return left if left > ROUNDED_AREA * area else 0.0
 

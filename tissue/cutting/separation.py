@@ -94,6 +94,8 @@ def _mark_faces_of(cut: Cut, t: int) -> None:
         if n_on == 4 and not _face_is_on(cut, t, f):
             continue
         other = link // 4
+        if body.is_rigid[t] and body.is_rigid[other]:
+            continue  # within a core
         side = tetrahedron_side(cut, t)
         other_side = tetrahedron_side(cut, other)
         if side * other_side >= 0:

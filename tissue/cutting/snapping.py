@@ -15,6 +15,7 @@ from tissue.cutting.cut_surface import note_side, on_cut_surface, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
     face_split_is_good,
+    is_edge_of_core,
     split_edge,
     split_face,
 )
@@ -130,6 +131,8 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
     surface, body = cut.surface, cut.body
     if on_cut_surface(surface, a) and on_cut_surface(surface, b):
         return  # the edge lies in the cut surface; on a lip it must stay equal to its twin
+    if is_edge_of_core(cut, a, b):
+        return
     pa = vec3(body.rest, a)
     pb = vec3(body.rest, b)
     normal = plane_at(cut.path, segment, lerp(t, pa, pb)).normal

@@ -57,14 +57,14 @@ def _face_star(cut: Cut, a: int, b: int, c: int) -> int:
 
 @kernel
 def edge_split_is_good(cut: Cut, a: int, b: int, t: float) -> bool:
-    """Return whether splitting edge ab at `t` leaves every altitude above the guard."""
+    """Return whether splitting edge ab at `t` splits no core, and every altitude stays high."""
     n = edge_star(cut.body, cut.visits, a, b, cut.scratch.parents)
     return _children_are_good(cut, n, 2, a, b, -1, Vec3(1.0 - t, t, 0.0))
 
 
 @kernel
 def face_split_is_good(cut: Cut, a: int, b: int, c: int, w: Vec3) -> bool:
-    """Return whether splitting face abc leaves every altitude above the guard.
+    """Return whether splitting face abc splits no core, and leaves altitudes above the guard.
 
     Args:
         cut: Body and limits.
@@ -75,6 +75,18 @@ def face_split_is_good(cut: Cut, a: int, b: int, c: int, w: Vec3) -> bool:
     """
     n = _face_star(cut, a, b, c)
     return _children_are_good(cut, n, 3, a, b, c, w)
+
+
+@kernel
+def is_edge_of_core(cut: Cut, a: int, b: int) -> bool:
+    """Return whether edge ab is of a rigid core, which is not split."""
+    body, parents = cut.body, cut.scratch.parents
+    if body.n_rigid == 0:
+        return False
+    is_of_core = False
+    for i in range(edge_star(body, cut.visits, a, b, parents)):
+        is_of_core = is_of_core or body.is_rigid[parents[i]]
+    return is_of_core
 
 
 @kernel
@@ -98,6 +110,8 @@ def _children_are_good(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w:
     p = Vec3(_mix(rest, a, b, c, w, 0), _mix(rest, a, b, c, w, 1), _mix(rest, a, b, c, w, 2))
     for i in range(n):
         t = cut.scratch.parents[i]
+        if body.is_rigid[t]:
+            return False
         for e in range(n_ends):
             replaced = _pick(e, a, b, c)
             q0 = p if body.tetrahedra[t, 0] == replaced else vec3(rest, body.tetrahedra[t, 0])

@@ -35,31 +35,34 @@ class RigidMotion(NamedTuple):
 
 
 @kernel
-def rigid_motion(body: Body, loose: LoosePieces, piece: int, motion: FloatArray) -> RigidMotion:
-    """Return the rigid part of the motion of a loose piece.
+def rigid_motion(
+    body: Body, positions: FloatArray, pieces: LoosePieces, piece: int, motion: FloatArray
+) -> RigidMotion:
+    """Return the rigid part of the motion of a piece: with its momentum and angular momentum.
 
     Args:
-        body: Masses and positions.
-        loose: The loose pieces.
+        body: Masses.
+        positions: Positions of the nodes [m].
+        pieces: The pieces.
         piece: Which of them.
         motion: Velocity, or displacement, of each node; shape (capacity, 3).
     """
-    begin, end = loose.begin[piece], loose.begin[piece + 1]
+    begin, end = pieces.begin[piece], pieces.begin[piece + 1]
     mass = 0.0
     centre, linear = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
     for k in range(begin, end):
-        i = loose.node[k]
+        i = pieces.node[k]
         m = body.masses[i]
         mass += m
-        centre = axpy(m, vec3(body.positions, i), centre)
+        centre = axpy(m, vec3(positions, i), centre)
         linear = axpy(m, vec3(motion, i), linear)
     centre, linear = scale(1.0 / mass, centre), scale(1.0 / mass, linear)
     turned = Vec3(0.0, 0.0, 0.0)
     c0, c1, c2 = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
     for k in range(begin, end):
-        i = loose.node[k]
+        i = pieces.node[k]
         m = body.masses[i]
-        r = sub(vec3(body.positions, i), centre)
+        r = sub(vec3(positions, i), centre)
         turned = axpy(m, cross(r, vec3(motion, i)), turned)
         rr = dot(r, r)
         c0 = axpy(m, axpy(-r.x, r, Vec3(rr, 0.0, 0.0)), c0)
@@ -86,7 +89,7 @@ def add_rigid_part(
         out: Where it is added, shape (capacity, 3).
     """
     for piece in range(len(loose.begin) - 1):
-        rigid = rigid_motion(body, loose, piece, motion)
+        rigid = rigid_motion(body, body.positions, loose, piece, motion)
         for k in range(loose.begin[piece], loose.begin[piece + 1]):
             i = loose.node[k]
             r = sub(vec3(body.positions, i), rigid.centre)

@@ -14,6 +14,7 @@ from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.forces.attachments import Attachments
 from tissue.mesh.body import Body
 from tissue.mesh.pieces import LoosePieces
+from tissue.mesh.rigid_cores import Cores
 from tissue.mesh.star import Visits
 
 
@@ -107,6 +108,8 @@ class StepContext(Arrays, two_precisions=True):
     """Points that are tied to what moves from outside."""
     loose: LoosePieces
     """The pieces that are not held: drag does not act on their rigid motion."""
+    cores: Cores
+    """Nodes that move as rigid bodies."""
     stages: Stages
     """Scratch of a step, the forces of the blade, and loads."""
     visits: Visits

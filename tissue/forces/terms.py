@@ -1,11 +1,11 @@
 """The forces that act on nodes from outside, in one list for each verb and in one fixed order.
 
 Blade, contact of the body with itself and the floor, attachments with their fibres, tetrahedra that
-are nearly flat, contact with rigid geoms, and supports. Another force is one more line in each
-function. Three exceptions have physical reasons:
+are nearly flat, contact with rigid geoms, rigid cores, and supports. Another force is one more line
+in each function. Three exceptions have physical reasons:
 
-- Contacts with geoms react to all other forces, and supports bear them: `add_reactions` follows
-  once the body is deformed.
+- Contacts with geoms react to all other forces, rigid cores to these too, and supports bear them:
+  `add_reactions` follows once the body is deformed.
 - The blade slips last in `end_substep`, where all nodes are at the end of the step.
 - What contact and attachments add to the frequencies is constant in an increment: it is found
   before, where they are.
@@ -37,6 +37,7 @@ from tissue.forces.attachments import (
     attached_energy,
     clear_attachment_forces,
 )
+from tissue.forces.core_reactions import add_core_reactions, clear_core_forces
 from tissue.forces.fibres import add_caught_forces, slip_fibres
 from tissue.forces.geom_reactions import add_geom_reactions
 from tissue.forces.step_context import Instant, StepContext
@@ -59,11 +60,12 @@ class TermEnergies(NamedTuple):
 
 @kernel
 def clear_terms(context: StepContext) -> None:
-    """Clear the forces of attachments, geoms and flat tetrahedra on the nodes."""
+    """Clear the forces of attachments, geoms, flat tetrahedra and rigid cores on the nodes."""
     external = context.stages.external
     clear_attachment_forces(context.attachments, external)
     clear_geom_forces(context.geoms, external)
     clear_collapse_forces(context.elastic.collapsing, context.body, external)
+    clear_core_forces(context.cores, external)
 
 
 @kernel
@@ -108,6 +110,7 @@ def add_reactions(
         instant: The instant, and its weight.
     """
     add_geom_reactions(context, positions, velocities, instant.share, instant.dt)
+    add_core_reactions(context, positions, velocities)
     if context.supports.is_moving == 1:
         add_support_work(context, positions, velocities, instant.seconds)
 
@@ -248,3 +251,4 @@ def _add_terms_at_rest(context: StepContext, retardation_time: float) -> None:
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
     add_collapse_forces(context.elastic.collapsing, body, x, external)
     add_geom_reactions(context, x, v, 0.0, 1.0)
+    add_core_reactions(context, x, v)

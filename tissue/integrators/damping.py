@@ -33,6 +33,7 @@ from tissue.elasticity.viscous_stress import is_viscous
 from tissue.forces.rigid_motion import add_rigid_part
 from tissue.forces.step_context import Damping, Stages, StepContext
 from tissue.forces.supports import add_support_damping
+from tissue.integrators.core_motion import change_cores_as_one
 from tissue.integrators.methods import METHODS, OF_NEXT_STEP
 from tissue.integrators.node_loops import (
     AVERAGES,
@@ -113,6 +114,7 @@ def damp(context: StepContext, h: float, begins_here: bool) -> None:
         run_loop(context, DAMPING_CHANGES, seconds)
         factor, change = seconds * damping.drag, context.stages.change
         add_rigid_part(context.body, context.loose, context.body.velocities, factor, change)
+        change_cores_as_one(context, change)
         if context.supports.is_moving == 1:
             add_support_damping(context, seconds)
         change_velocities(damping, context.body, context.stages)

@@ -29,6 +29,7 @@ from tissue.elasticity.relaxed_stress import relaxes
 from tissue.forces.contact_frequencies import frequency_of_contacts
 from tissue.forces.step_context import StepContext
 from tissue.forces.terms import end_substep
+from tissue.integrators.core_motion import hold_cores_at_geoms
 from tissue.integrators.damping import damp_if_due, relax_stress
 from tissue.integrators.methods import NYSTROEM, RUNGE_KUTTA
 from tissue.integrators.nystroem import nystroem_step
@@ -157,6 +158,8 @@ def take_steps(
         damp_if_due(context, method, i, n, share * dt)
         _take_step(context, method, edge, dt, at, share)
         end_substep(context, edge, dt, share, at + share)
+        if context.geoms.n_contacts > 0:
+            hold_cores_at_geoms(context)
 
 
 @kernel

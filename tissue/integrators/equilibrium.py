@@ -132,7 +132,7 @@ def _relax(
 
 
 def _disturb(system: TissueModel) -> None:
-    """Move every free node a little, always by the same displacements.
+    """Move every free node but those of cores a little, always by the same displacements.
 
     A symmetric body that is compressed from a symmetric start comes to a symmetric equilibrium, be
     it as unstable as a needle on its point: a block of springs between two plates stayed there with
@@ -140,6 +140,7 @@ def _disturb(system: TissueModel) -> None:
     """
     body, n = system.body, system.body.n_nodes
     free = ~body.fixed[:n]
+    free[system.cores.nodes] = False
     shifts = np.random.default_rng(0).uniform(-1.0, 1.0, (n, 3))
     body.positions[:n][free] += DISTURBANCE * system.node_size * shifts[free]
 

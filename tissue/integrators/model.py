@@ -30,6 +30,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
+from tissue.mesh.rigid_cores import RigidCores
 from tissue.mesh.star import LARGEST_STAR, mean_node_size, no_visits
 from tissue.mesh.surface import inverted_share, lowest_altitude
 
@@ -119,6 +120,8 @@ class TissueModel:
         """What they add to w^2 of the body at most [1/s2]."""
         self.geoms = no_geoms(body, self.node_size)
         """Contact with rigid geoms."""
+        self.cores = RigidCores()
+        """Sets of tetrahedra that move as rigid bodies."""
         self.loose = no_loose_pieces()
         """The pieces that are not held, as they were found last."""
         self.touched = np.zeros(len(body.rest), dtype=np.int64)
@@ -160,6 +163,7 @@ class TissueModel:
             self.supports,
             self.attachments,
             self.loose,
+            self.cores.arrays,
             self.stages,
             self.visits,
         )

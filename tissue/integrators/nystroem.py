@@ -26,6 +26,7 @@ from tissue.blade.edge import Edge
 from tissue.core.jit import inlined, kernel
 from tissue.forces.acceleration import is_solid
 from tissue.forces.step_context import Instant, StepContext
+from tissue.integrators.core_motion import hold_cores
 from tissue.integrators.evaluation import evaluate_forces
 from tissue.integrators.node_loops import (
     DEFORMED,
@@ -65,13 +66,16 @@ def nystroem_step(context: StepContext, edge: Edge, dt: float, at: float, share:
     solid.are_gradients_known = 0
     run_loop(context, NYSTROEM_FIRST, h)
     x2, v2 = stages.positions, stages.velocities
+    hold_cores(context, x2, v2)
     loop = DISPLACED if is_displaced else DISPLACEMENTS_2
     evaluate_forces(context, edge, x2, v2, loop, _instant(1, at, share, dt))
     run_loop(context, NYSTROEM_SECOND, h)
     x3, v3 = stages.last_positions, stages.velocities
+    hold_cores(context, x3, v3)
     loop = DISPLACED if is_displaced else DISPLACEMENTS_LAST
     evaluate_forces(context, edge, x3, v3, loop, _instant(2, at, share, dt))
     run_loop(context, NYSTROEM_THIRD, h)
+    hold_cores(context, x1, v1)
 
 
 @inlined

@@ -21,6 +21,7 @@ from tissue.core.jit import kernel
 from tissue.elasticity.viscous_stress import is_viscous
 from tissue.forces.rigid_motion import note_loose_positions, return_rigid_motion
 from tissue.forces.step_context import Instant, StepContext
+from tissue.integrators.core_motion import hold_cores
 from tissue.integrators.damping import (
     begin_damped_step,
     counts_stage_damping,
@@ -63,6 +64,7 @@ def runge_kutta_step(context: StepContext, edge: Edge, dt: float, at: float, sha
         end_damped_step(context, before, share * dt)
     if is_dragged:
         return_rigid_motion(context, share * dt)
+    hold_cores(context, context.body.positions, context.body.velocities)
 
 
 @kernel
@@ -85,6 +87,7 @@ def runge_kutta_nystroem(
     evaluate_forces(context, edge, x1, v1, DISPLACEMENTS, first)
     run_loop(context, FIRST_STAGE, h)
     x2, v2 = stages.positions, stages.velocities
+    hold_cores(context, x2, v2)
     middle = Instant(half, share * 2.0 / 3.0, h * 2.0 / 3.0, dt)
     evaluate_forces(context, edge, x2, v2, DISPLACEMENTS_2, middle)
     run_loop(context, SECOND_STAGE, h)
@@ -93,6 +96,7 @@ def runge_kutta_nystroem(
             resist_shared(context, stages.change)
         run_loop(context, THIRD_STAGE, h)
     x4, v4 = stages.last_positions, stages.velocities
+    hold_cores(context, x4, v4)
     last = Instant(end, share / 6.0, h / 6.0, dt)
     evaluate_forces(context, edge, x4, v4, DISPLACEMENTS_LAST, last)
     run_loop(context, FOURTH_STAGE, h)

@@ -12,6 +12,7 @@ from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
 from tissue.forces.acceleration import is_solid
 from tissue.forces.step_context import Instant, StepContext
+from tissue.integrators.core_motion import drift_cores
 from tissue.integrators.evaluation import evaluate_forces
 from tissue.integrators.node_loops import DISPLACED, DISPLACEMENTS, DRIFTING, KICKING, run_loop
 
@@ -29,6 +30,7 @@ def verlet_step(context: StepContext, edge: Edge, dt: float, at: float, share: f
     """
     h, moves_in_loops = share * dt, is_solid(context)
     run_loop(context, DRIFTING, 0.5 * h)
+    drift_cores(context, 0.5 * h)
     x, v = context.body.positions, context.body.velocities
     loop = DISPLACED if moves_in_loops else DISPLACEMENTS
     evaluate_forces(context, edge, x, v, loop, Instant(at + 0.5 * share, share, h, dt))
@@ -36,3 +38,4 @@ def verlet_step(context: StepContext, edge: Edge, dt: float, at: float, share: f
     if not moves_in_loops:
         # Only now: until here springs saw all nodes at the middle of the step.
         run_loop(context, DRIFTING, 0.5 * h)
+    drift_cores(context, 0.5 * h)

@@ -116,6 +116,12 @@ class Handles:
         body = self._model.body
         self.led_supports.lead(body, _supports_at(body, where), path)
 
+    def make_rigid(self, where: str | npt.ArrayLike, added_density: float) -> int:
+        """Make tetrahedra rigid; see `tissue.Tissue.make_rigid`."""
+        body = self._model.body
+        mask = region_mask(body, where if isinstance(where, str) else np.asarray(where))
+        return self._model.cores.add(body, mask, added_density)
+
     def _note_moving(self) -> None:
         """Note whether a support moves."""
         body = self._model.body

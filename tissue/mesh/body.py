@@ -62,6 +62,10 @@ class Body(Arrays):
     """Node indices, shape (capacity, 4)."""
     links: IntArray = sized("tetrahedra", 4)
     """Half-face behind each face, shape (capacity, 4)."""
+    is_rigid: BoolArray = sized("tetrahedra")
+    """Whether each tetrahedron is in a rigid core, shape (capacity,)."""
+    n_rigid: IntCell
+    """Number of tetrahedra in rigid cores."""
     n_nodes: IntCell
     """Number of nodes."""
     n_tetrahedra: IntCell
@@ -105,7 +109,7 @@ def build_body(
     node_tetrahedron = np.zeros(n, dtype=np.int64)
     node_tetrahedron[tetrahedra[::-1]] = np.arange(len(tetrahedra))[::-1, None]
     return Body.new(
-        {"nodes": n},
+        {"nodes": n, "tetrahedra": len(tetrahedra)},
         rest=grown(rest, n),
         lattice_rest=np.floor((rest - lattice.origin) / lattice.spacing + 0.5).astype(np.int64),
         positions=grown(rest if positions is None else positions, n),

@@ -105,7 +105,7 @@ _OF_NODES = {
 """Arrays with a row for each node of the body."""
 
 _OF_TETRAHEDRA = {
-    "Body": ("tetrahedra", "links"),
+    "Body": ("tetrahedra", "links", "is_rigid"),
     "Collapsing": ("stiffness", "limit", "per_volume"),
     "CutSurface": ("tetrahedron_stamp", "tetrahedron_side"),
     "Faces": ("place", "piece"),

@@ -132,6 +132,8 @@ def _force(contacts: RigidContacts, row: int) -> FloatArray:
 
 def _state_of_anchor(anchors: Anchors, k: int) -> str:
     """Return the state of an anchor in words."""
+    if anchors.at_core[k]:
+        return "anchored, at a rigid core"
     state = "slips" if anchors.slips[k] else "anchored"
     return f"{state}, at the skin" if anchors.at_skin[k] else state
 

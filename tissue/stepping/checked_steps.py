@@ -21,6 +21,7 @@ from tissue.integrators.integrator import REMEDY, UnstableError
 from tissue.loads.handles import StepInputs
 from tissue.mesh.body import Body
 from tissue.mesh.node_motion import is_motion_finite
+from tissue.mesh.rigid_cores import CoreCutError
 from tissue.state.tissue_state import RULES
 from tissue.stepping.energy_audit import RESIDUAL
 from tissue.stepping.judgement import StepWatch
@@ -125,6 +126,9 @@ class CheckedSteps:
             except NoRoomError as error:
                 state.restore()
                 self._stages.make_more_room(error.lacking)
+            except CoreCutError:
+                state.restore()
+                raise
 
     def _try(self, inputs: StepInputs) -> tuple[StepResult | None, str]:
         """Do a step after a test; return its result, or None and what was wrong with it."""
@@ -140,6 +144,11 @@ class CheckedSteps:
             return self._try(inputs)
         except UnstableError as error:
             return None, error.fault
+        except CoreCutError:
+            stages.global_stepper.refine(1)
+            self.go_back(inputs)
+            self.save()
+            raise
         except ArithmeticError as error:
             return None, f"a number cannot be computed ({error})"
         except BaseException:

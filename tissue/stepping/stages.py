@@ -98,14 +98,15 @@ class StepStages:
 
     @property
     def owners(self) -> tuple[Owner, ...]:
-        """All that follows changes of the mesh, and grows with it, in the order in which it does.
+        """All that follows changes of the mesh, and grows with it, in that order: the model first.
 
-        The model is the first: the others see its new body.
+        The others see its new body. Cores add to the masses that elasticity wrote.
         """
         model = self.model
         return (
             model,
             model.elasticity,
+            model.cores,
             model.interaction,
             model.contact,
             model.geoms,
@@ -262,14 +263,13 @@ class StepStages:
         interaction, contact, geoms = model.interaction, model.contact, model.geoms
         parts = (
             *(model.body, model.visits, model.stages, model.elasticity.arrays),
-            *(model.supports, model.attachments, model.loose, model.damping),
+            *(model.supports, model.attachments, model.loose, model.damping, model.cores.arrays),
             *(interaction.state, interaction.grid, interaction.latest_report, path),
             *(contact.search, contact.forces, geoms.arrays, geoms.search, geoms.faces),
             stepper.choice,
         )
         if self._frame is None or not all(map(is_, parts, self._parts)):
-            where = path, self._bounds, self._slit_reach
-            blade = interaction.context(model.body, model.visits, *where)
+            blade = interaction.context(*parts[:2], path, self._bounds, self._slit_reach)
             self._frame = FrameContext(
                 n_increments=1,
                 travel=0.0,
