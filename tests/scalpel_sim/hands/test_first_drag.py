@@ -20,9 +20,10 @@ SIZES = {"desk": (1400, 900), "tablet": (900, 1200), "phone": (390, 800)}
 LEAST_CUT = 200e-6
 """Area that the first drag has cut at least [m2]."""
 
-SMALL_CUTS = {"skin": 40e-6}
+SMALL_CUTS = {"skin": 40e-6, "excise": 140e-6}
 """Where it is less [m2]: half of the section of `skin`, which has 80 mm2. A drag that ends at the
-edge of the body leaves the last of it, which tough skin carries along."""
+edge of the body leaves the last of it, which tough skin carries along. In `excise`, 8 mm high, a
+level drag goes along 20 to 30 mm of the line."""
 
 KINDS = [("organ", "desk"), ("skin", "phone"), ("gelatin", "tablet"), ("retract", "phone")]
 """One scene and window of each kind: a blade that stands, through an organ and through a sheet; an
