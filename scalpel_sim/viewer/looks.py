@@ -24,6 +24,8 @@ class Look(NamedTuple):
     the darker one."""
     variation: float = 1.0
     """Variation of the colour from place to place, over that in an organ."""
+    translucency: float = 0.0
+    """Share of the light that goes through, where a graphics card draws."""
     glow: int = 0x3A0A0E
     """Light scattered between the faces of a cut, 0xRRGGBB. Without it a narrow cut looks black."""
 
@@ -79,6 +81,7 @@ LOOKS = {
         vessels=0.0,
         fibres=0.15,
         rim=0.0,
+        translucency=0.75,
         variation=0.15,
         glow=0x3A2408,
     ),
@@ -88,6 +91,7 @@ LOOKS = {
         vessels=0.0,
         fibres=0.1,
         rim=0.0,
+        translucency=0.25,
         variation=0.15,
         glow=0x24221E,
     ),

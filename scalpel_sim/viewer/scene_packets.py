@@ -205,12 +205,12 @@ class ScenePackets:
 
 def _set_tissue_appearances(scene: Scene3D, diagonal: float, look: Look) -> None:
     """Define the appearances of skin and cut faces, with relief [m] in proportion to the body."""
-    relief = {"bumpScale": 0.0025 * diagonal}
-    for name, picture, glow in (
-        ("skin", textures.skin(look), 0x000000),
-        ("cut", textures.cut_face(look), look.glow),
+    wet = {**_WET, "bumpScale": 0.0025 * diagonal, "translucency": look.translucency}
+    for name, picture, own in (
+        ("skin", textures.skin(look), {}),
+        ("cut", textures.cut_face(look), {"finish": "cut", "emissive": look.glow}),
     ):
-        properties = {**_WET, **relief, "emissive": glow}
+        properties = {**wet, **own}
         maps = {"map": picture, "bumpMap": picture}
         scene.set_appearance(name, Appearance("MeshPhongMaterial", properties, maps))
 

@@ -6,17 +6,20 @@
 const WET = {
     roughness: 0.55, metalness: 0, clearcoat: 0.5, clearcoatRoughness: 0.22, envMapIntensity: 0.55,
 };
+const CUT = { ...WET, roughness: 0.42, clearcoat: 1, clearcoatRoughness: 0.12, envMapIntensity: 0.7 }; // it has just bled
+const JELLY = { roughness: 0.3, ior: 1.34, clearcoat: 0.6, clearcoatRoughness: 0.1 };
+const JELLY_THICKNESS = 0.25; // through which light goes, over the size of the scene
 const STEEL_COLOUR = 0xdfe4e8;
 const POLISHED = { roughness: 0.24, metalness: 1, envMapIntensity: 1.7 };
 const BRUSHED = { roughness: 0.42, metalness: 1, envMapIntensity: 0.75 };
-const FINISHES = { wet: WET, steel: POLISHED, brushed: BRUSHED };
+const FINISHES = { wet: WET, cut: CUT, steel: POLISHED, brushed: BRUSHED };
 
 const CLOTH_MEAN = 0.75; // of the texture of cloth, linear
 
 // `redraw` is called when a texture has been read.
-function materialOf(kind, { finish, ...properties }, maps, room, redraw) {
+function materialOf(kind, { finish, translucency = 0, ...properties }, maps, room, redraw) {
     const material = new THREE[kind]({ ...properties, side: THREE.DoubleSide });
-    material.userData.finish = finish;
+    Object.assign(material.userData, { finish, translucency });
     for (const colour of [material.color, material.specular, material.emissive]) {
         if (colour) colour.convertSRGBToLinear();
     }
@@ -40,7 +43,20 @@ function richOf(material, room) {
     for (const property of ["vertexColors", "map", "bumpMap", "bumpScale"]) rich[property] = material[property];
     rich.color.copy(finish.metalness > 0 ? new THREE.Color(STEEL_COLOUR).convertSRGBToLinear() : material.color);
     rich.emissive.copy(material.emissive);
+    const { translucency } = material.userData;
+    if (translucency > 0) {
+        rich.userData.transmission = translucency;
+        Object.assign(rich, JELLY, { transmission: translucency });
+    }
     return rich;
+}
+
+// Let light through a material that may, or not, as where it is drawn faint.
+function setTranslucent(material, isTranslucent) {
+    const transmission = isTranslucent ? material.userData.transmission : 0;
+    if (transmission === undefined || transmission === material.transmission) return;
+    material.transmission = transmission;
+    material.needsUpdate = true;
 }
 
 // The same without relief, reflection and gloss, lit at the vertices: a picture by software takes a

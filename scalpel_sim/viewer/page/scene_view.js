@@ -119,10 +119,10 @@ class SceneView {
                 wireframe: true, transparent: true, opacity: 0.7,
                 polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1,
             }));
-            mesh.add(wires);
+            mesh.add(wires, markOf(mesh));
             this.wires.set(part, wires);
         }
-        wires.geometry = mesh.geometry;
+        for (const child of mesh.children) child.geometry = mesh.geometry;
         this.tissue.set(part, { mesh, geometry: mesh.geometry });
     }
 
@@ -200,6 +200,8 @@ class SceneView {
             material.opacity = isFaint ? FAINT : 1;
             material.transparent = isFaint;
             material.depthWrite = !isFaint;
+            setTranslucent(material, !isFaint);
+            mesh.getObjectByName("mark").visible = material.transmission > 0;
         }
         this.viewer.set_dirty();
     }
@@ -234,6 +236,9 @@ class SceneView {
         controls.minDistance = Math.min(extent / 10, distance);
         controls.maxDistance = Math.max(extent * 20, distance);
         controls.update();
+        for (const each of this.appearances.values()) {
+            if (each.userData.transmission) each.thickness = JELLY_THICKNESS * extent;
+        }
         this.lights.aim(new THREE.Vector3(...target), new THREE.Vector3(...eye), extent);
     }
 

@@ -15,6 +15,16 @@ function treatMarks(material, part) {
     }
 }
 
+// What marks the pixels of tissue that lets light through, which is drawn after the links.
+function markOf(mesh) {
+    const material = new THREE.MeshBasicMaterial({ colorWrite: false, depthWrite: false, side: THREE.DoubleSide });
+    treatMarks(material, "body");
+    const mark = new THREE.Mesh(mesh.geometry, material);
+    mark.name = "mark";
+    mark.renderOrder = ORDERS.body;
+    return mark;
+}
+
 // Draw a mesh of such a part in its turn; a link has a faint twin.
 function drawInTurn(mesh, part, material) {
     mesh.renderOrder = ORDERS[part] ?? 0;

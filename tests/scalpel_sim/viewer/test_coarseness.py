@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from scalpel_sim.viewer.looks import LOOKS
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
@@ -26,6 +27,23 @@ LEVELS_ON = """([full, same, first]) => {
     });
 }"""
 """The level after each picture: a full one takes so long [ms], and some of it at all levels."""
+
+AS_WITH_A_CARD = """
+    const get = WebGL2RenderingContext.prototype.getParameter;
+    WebGL2RenderingContext.prototype.getParameter = function (name) {
+        return name === 0x9246 || name === 0x1F01 ? "a graphics card" : get.call(this, name);
+    };
+"""
+"""Names the software that draws otherwise."""
+
+
+def replay_of_gelatin(folder):
+    """Write a replay of a cut block of gelatin; return its path."""
+    model, data = little_arm()
+    replay = ReplayWriter(model, frame=FRAME, look=LOOKS["gelatin"])
+    replay.add(0.0, SceneState(cut_tissue()[2], body_poses(data), readings(0.0)))
+    replay.write(folder / "gelatin.html")
+    return folder / "gelatin.html"
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +102,22 @@ def test_what_moves_is_drawn_as_coarsely_as_needed_and_what_rests_in_full(tab):
     assert tab.evaluate(drawn) == fine and fine[:2] == [True, 1]
     tab.evaluate(UNTIL_DRAWN)
     assert np.array_equal(pixels(tab), in_full)
+
+
+@pytest.mark.parametrize("has_card", [True, False])
+def test_gelatin_lets_light_through_where_a_card_draws_it_finely(browser, tmp_path, has_card):
+    tab = new_tab(browser)
+    if has_card:
+        tab.add_init_script(AS_WITH_A_CARD)
+    tab.goto(local_file(replay_of_gelatin(tmp_path)))
+    tab.wait_for_function("typeof player !== 'undefined' && player.shown >= 0")
+    tab.evaluate("player.pause()")
+    passes = "sceneView.tissue.get('skin').mesh.material.transmission > 0"
+    tab.wait_for_function("coarseness.drawn === 0")
+    assert tab.evaluate(passes) == has_card
+    tab.evaluate("coarseness.draw(LEVELS.length - 1)")
+    assert not tab.evaluate(passes)
+    tab.evaluate("coarseness.draw(0), setShown('cut')")
+    assert not tab.evaluate(passes), "a faint skin is faint"
+    assert tab.failures == []
+    tab.close()
