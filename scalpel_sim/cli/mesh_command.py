@@ -3,10 +3,10 @@
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
@@ -37,12 +37,17 @@ class MeshOptions:
     it is thin]."""
     coarsen: Flag = False
     "Make as few tetrahedra as the tolerance allows, of a surface."
+    keep_labels: str | None = None
+    "Labels of a volume to make tissue of, as in 3,5 [default: all but 0]."
+    label: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = ()
+    """Join labels of a volume and name them, as in 3,5=liver; or name one: 2=tumour. May be given
+    several times."""
 
 
 @Parameter(name="*", group=_MESH)
 @dataclass(frozen=True)
 class LimitOptions:
-    """What the mesher may use."""
+    """Limits of the mesher."""
 
     time_limit: float = 300.0
     "Longest that it may take [s]."
@@ -60,34 +65,66 @@ def mesh(
     limits: LimitOptions = LimitOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Make tetrahedra that can be cut from a surface: STL, OBJ, PLY or GLB.
+    """Make tetrahedra that can be cut, from a surface or from a segmentation.
 
-    Holes are closed, parts that overlap become one body, and triangles may face either way. It
-    needs the extra `mesh` (pip install 'scalpel-sim[mesh]'). For example:
+    Surfaces (STL, OBJ, PLY, GLB): holes are closed, parts that overlap become one body, and
+    triangles may face either way. Label volumes (NIfTI, NRRD): each tetrahedron keeps its label,
+    and labels that touch share faces. It needs the extra `mesh` (pip install
+    'scalpel-sim[mesh]'). For example:
 
     ```console
     scalpel-sim mesh liver.stl --scale 0.001 -o liver.vtu
+    scalpel-sim mesh abdomen.nii.gz --keep-labels 3,5 --label 5=tumour -o liver.vtu
     scalpel-sim run --mesh liver.vtu
     ```
 
     Args:
-        file: The surface.
+        file: The surface, or the label volume.
         out: The mesh to write, a FILE.vtu [default: the name of the file, here, with .vtu].
         force: Replace the mesh if it exists.
     """
     with log_to_stderr(printing):
-        from scalpel_sim.meshing.filling import fill
-        from scalpel_sim.meshing.limited_process import ProcessLimits
-        from scalpel_sim.meshing.meshed import Meshed
-
         target = _target(file, out, force=force)
-        filled = fill(
-            file,
-            **asdict(lengths),
-            limits=ProcessLimits(limits.time_limit, limits.memory_limit),
-            on_progress=_shown(printing),
-        )
-        _write(Meshed(filled.mesh, filled.notes()), target, printing)
+        _write(_meshed(file, lengths, limits, _shown(printing)), target, printing)
+
+
+def _meshed(
+    file: Path, lengths: MeshOptions, limits: LimitOptions, on_progress: Callable[[str], None]
+) -> "Meshed":
+    """Return the mesh that is made of a file, by what it is.
+
+    Raises:
+        UsageError: it is none of those that are known, or has no use for an option.
+    """
+    from scalpel_sim.meshing.filling import fill
+    from scalpel_sim.meshing.label_volume import VOLUME_FILES, is_label_volume
+    from scalpel_sim.meshing.limited_process import ProcessLimits
+    from scalpel_sim.meshing.meshed import Meshed
+    from scalpel_sim.meshing.stuffing import stuff_volume
+    from scalpel_sim.meshing.surface import SURFACE_FILES
+
+    given = asdict(lengths)
+    if is_label_volume(file):
+        _expect_none(given, ("tolerance", "coarsen"), f"{file} is a label volume")
+        return stuff_volume(file, **given, on_progress=on_progress)
+    if file.suffix.lower() not in SURFACE_FILES:
+        known = ", ".join((*SURFACE_FILES, *VOLUME_FILES))
+        raise UsageError(f"{file}: expected a file that ends in {known}")
+    _expect_none(given, ("keep_labels", "label"), f"{file} is a surface")
+    allowed = ProcessLimits(limits.time_limit, limits.memory_limit)
+    filled = fill(file, **given, limits=allowed, on_progress=on_progress)
+    return Meshed(filled.mesh, filled.notes())
+
+
+def _expect_none(given: dict[str, Any], names: Sequence[str], reason: str) -> None:
+    """Take options away that have no use, and check that they were not given.
+
+    Raises:
+        UsageError: one was.
+    """
+    for name in names:
+        if given.pop(name):
+            raise UsageError(f"--{name.replace('_', '-')} has no use here: {reason}; omit it")
 
 
 def _target(file: Path, out: Path | None, *, force: bool) -> Path:

@@ -12,14 +12,15 @@ import numpy as np
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.meshing.filling_process import FILLED_MESH, Request
 from scalpel_sim.meshing.limited_process import ProcessLimits, limited_process
+from scalpel_sim.meshing.meshed import without_specks
 from scalpel_sim.meshing.sizes import FillingSizes
-from scalpel_sim.meshing.surface import SURFACE_FILES, FileSurface
+from scalpel_sim.meshing.surface import FileSurface
 
 if TYPE_CHECKING:
     from tissue import TetrahedralMesh
 
 _PASS = re.compile(r"/ pass (\d+) /")
-"""How fTetWild's log names a pass."""
+"""A pass in fTetWild's log."""
 
 _USUAL_PASSES = 80
 """Passes after which fTetWild ends by itself."""
@@ -82,8 +83,6 @@ def fill(
             raise UsageError(f"{name} is {length:g} m; it must be positive")
     if not path.is_file():
         raise UsageError(f"{path}: {'this is no file' if path.exists() else 'no such file'}")
-    if path.suffix.lower() not in SURFACE_FILES:
-        raise UsageError(f"{path}: expected a surface, a file ending in {', '.join(SURFACE_FILES)}")
     request = Request(str(path.absolute()), scale, edge_length, tolerance, coarsen, limits.memory)
 
     def show(log: str, passed: float) -> None:
@@ -106,4 +105,5 @@ def fill(
             f"{path}: no tetrahedron fits in: the body is thinner than the tolerance of "
             f"{sizes.tolerance * 1e3:.2g} mm; give a smaller --tolerance"
         )
-    return Filled(mesh_from_arrays(positions, tetrahedra), surface, sizes)
+    mesh, specks = without_specks(mesh_from_arrays(positions, tetrahedra))
+    return Filled(mesh, surface._replace(notes=(*surface.notes, *specks)), sizes)

@@ -71,7 +71,7 @@ def fill_requested(folder: Path, request: Request) -> None:
 
 
 def _without_pyvista() -> None:
-    """Let pytetwild be imported where PyVista, which it needs for its own meshes, is not installed.
+    """Make pytetwild importable where PyVista, which it needs for its own meshes, is not installed.
 
     From 0.4 on it imports PyVista to register itself there, and does nothing with an older one.
     """

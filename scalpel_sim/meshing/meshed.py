@@ -1,4 +1,4 @@
-"""What the command `mesh` has made, in figures and in lines to print."""
+"""The mesh that the command `mesh` has made, in figures and in lines to print."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,7 +17,35 @@ class Meshed(NamedTuple):
 
     mesh: "TetrahedralMesh"
     notes: tuple[str, ...]
-    """What was mended, closed, dropped or moved: one line each."""
+    """Lines on all that was mended, closed, dropped or moved."""
+
+
+SPECK = 0.01
+"""Share of the volume of a mesh, below which a piece of it is left out: it would fall."""
+
+
+def without_specks(mesh: "TetrahedralMesh") -> tuple["TetrahedralMesh", tuple[str, ...]]:
+    """Return a mesh without its smallest pieces, and a line on them."""
+    from tissue.support import components, signed_volumes
+
+    edges = mesh.tetrahedra[:, [[0, 1], [0, 2], [0, 3]]].reshape(-1, 2)
+    _, piece = components(len(mesh.positions), edges)
+    of_tetrahedron = piece[mesh.tetrahedra[:, 0]]
+    volumes = np.bincount(of_tetrahedron, signed_volumes(mesh.positions, mesh.tetrahedra))
+    is_speck = volumes < SPECK * volumes.sum()
+    if not is_speck.any():
+        return mesh, ()
+    kept = ~is_speck[of_tetrahedron]
+    used, tetrahedra = np.unique(mesh.tetrahedra[kept], return_inverse=True)
+    labels = None if mesh.labels is None else mesh.labels[kept]
+    note = (
+        f"left out {is_speck.sum()} pieces with {volumes[is_speck].sum() / volumes.sum():.2%} of "
+        f"the volume, each less than {SPECK:.0%}"
+    )
+    whole = mesh._replace(
+        positions=mesh.positions[used], tetrahedra=tetrahedra.reshape(-1, 4), labels=labels
+    )
+    return whole, (note,)
 
 
 class MeshFigures(NamedTuple):
@@ -32,7 +60,7 @@ class MeshFigures(NamedTuple):
     volume: float
     """[m3]"""
     volumes: dict[str, float]
-    """Of each label, by its name, or else its number [m3]; empty without labels."""
+    """Of each label, by its number and name [m3]; empty without labels."""
     edge_length: float
     """In the mean [m]."""
     lowest_quality: float
@@ -52,8 +80,10 @@ class MeshFigures(NamedTuple):
         by_label = {}
         if mesh.labels is not None:
             for label in np.unique(mesh.labels).tolist():
-                name = mesh.label_names.get(label, str(label))
-                by_label[name] = float(volumes[mesh.labels == label].sum())
+                name = mesh.label_names.get(label)
+                by_label[f"{label} ({name})" if name else str(label)] = float(
+                    volumes[mesh.labels == label].sum()
+                )
         return cls(
             n_tetrahedra=len(mesh.tetrahedra),
             n_nodes=len(mesh.positions),
@@ -78,5 +108,7 @@ def lines_about(meshed: Meshed, figures: MeshFigures, out: Path) -> list[str]:
         f"{figures.lowest_quality:.2f} at least, {figures.median_quality:.2f} in the median "
         "(1: regular, 0: flat)",
     ]
-    lines += [f"label {name}: {_ML_PER_M3 * v:.4g} ml" for name, v in figures.volumes.items()]
+    lines += [
+        f"label {name}: {_ML_PER_M3 * volume:.4g} ml" for name, volume in figures.volumes.items()
+    ]
     return [*lines, *meshed.notes, f"cut it with: scalpel-sim run --mesh {out}"]

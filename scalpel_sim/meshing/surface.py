@@ -41,7 +41,7 @@ class FileSurface(NamedTuple):
     triangles: IntArray
     """Indices of vertices, shape (n_triangles, 3)."""
     notes: tuple[str, ...] = ()
-    """What was mended, and what the mesher will close."""
+    """Lines on what was mended, and what the mesher will close."""
 
     def size(self) -> float:
         """Return the diagonal of the box around it [m]."""
