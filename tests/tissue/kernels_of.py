@@ -37,6 +37,7 @@ from tissue.laws.energy_density import volume_term
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import SPARE_NODES, new_change
 from tissue.mesh.pieces import no_loose_pieces
+from tissue.mesh.rigid_cores import no_cores
 from tissue.mesh.star import LARGEST_STAR, no_visits
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
@@ -165,6 +166,7 @@ class Network(NamedTuple):
             supports=supports_at_rest(),
             attachments=no_attachments(),
             loose=no_loose_pieces(),
+            cores=no_cores(),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
             team=new_team(),
