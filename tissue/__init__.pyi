@@ -34,6 +34,10 @@ from .io.mesh_io import mesh_from_arrays as mesh_from_arrays
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_mesh as write_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .io.mesh_report import LabelShare as LabelShare
+from .io.mesh_report import MeshReport as MeshReport
+from .io.mesh_report import MeshShape as MeshShape
+from .io.mesh_report import report_on_mesh as report_on_mesh
 from .laws import LAWS as LAWS
 from .laws.exponential import Exponential as Exponential
 from .laws.law import Law as Law
@@ -122,6 +126,7 @@ __all__ = [
     "Yeoh",
     "Attachment",
     "FramePath",
+    "LabelShare",
     "Ligament",
     "Load",
     "MATERIALS",
@@ -132,6 +137,8 @@ __all__ = [
     "SupportPath",
     "MeshError",
     "MeshMeasures",
+    "MeshReport",
+    "MeshShape",
     "Piece",
     "ELEMENTS",
     "PRECISIONS",
@@ -169,6 +176,7 @@ __all__ = [
     "mesh_from_arrays",
     "pieces_of",
     "read_mesh",
+    "report_on_mesh",
     "spring_error",
     "toughness_law_of",
     "write_mesh",

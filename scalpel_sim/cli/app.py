@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
+from scalpel_sim.cli.check_command import check
 from scalpel_sim.cli.crtk_command import crtk
 from scalpel_sim.cli.doctor_command import doctor
 from scalpel_sim.cli.explain_command import explain
@@ -223,6 +224,7 @@ def _key(file: Path, /, *, printing: PrintOptions = PrintOptions()) -> None:
 
 
 app.command(warm_up, name="warm-up")
+app.command(check)
 app.command(doctor)
 app.command(bench)
 app.command(figure)

@@ -3,6 +3,7 @@
 In the order in which they are best read:
 
     mesh_io          read a mesh by the content of its file, check it
+    mesh_report      what is in the file of a mesh
     byte_reader      the bytes of a file, taken piece by piece, with errors that name the line
     cell_types       types of cells, and a clear error where none fill a volume
     cell_division    hexahedra, wedges and pyramids divided into tetrahedra

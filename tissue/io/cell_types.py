@@ -87,8 +87,8 @@ def expect_volumes(counts: Mapping[CellType, int]) -> None:
         return
     if any(each.dimension == 2 for each in types):
         raise MeshError(
-            f"only a surface, no tetrahedra: found {found}. Fill it with tetrahedra first, with "
-            "Gmsh or fTetWild for example"
+            f"only a surface, no tetrahedra: found {found}. Save it as STL, and fill it by "
+            "`scalpel-sim mesh`"
         )
     raise MeshError(f"there are no tetrahedra; found {found or 'no cells'}")
 

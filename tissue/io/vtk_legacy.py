@@ -197,8 +197,7 @@ class _Reader:
         if dataset == ["DATASET", "POLYDATA"]:
             reader.fail(
                 "only a surface, no tetrahedra: found DATASET POLYDATA, expected DATASET "
-                "UNSTRUCTURED_GRID. Fill it with tetrahedra first, with Gmsh or fTetWild for "
-                "example",
+                "UNSTRUCTURED_GRID. Save it as STL, and fill it by `scalpel-sim mesh`",
                 at,
             )
         if dataset != ["DATASET", "UNSTRUCTURED_GRID"]:

@@ -74,7 +74,7 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
             labels that are no whole numbers from 0 on.
     """
     try:
-        result = _checked(mesh)
+        result = examined(mesh)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
     for warning in result.warnings:
@@ -91,7 +91,7 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> TetrahedralMesh:
         MeshError: `checked` would refuse the mesh or repair it.
     """
     try:
-        result = _checked(mesh)
+        result = examined(mesh)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
     mesh = mesh_arrays(mesh)
@@ -107,8 +107,12 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> TetrahedralMesh:
     return mesh
 
 
-def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
-    """Return what `checked` returns: one check after another, each relying on those before."""
+def examined(mesh: TetrahedralMesh) -> CheckedMesh:
+    """Return what `checked` returns, and log nothing.
+
+    Raises:
+        MeshError: `checked` would refuse the mesh.
+    """
     warnings: list[str] = []
     positions, tetrahedra, labels, names = mesh_arrays(mesh)
     _refuse_wrong_indices(tetrahedra, len(positions))

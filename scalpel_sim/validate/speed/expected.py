@@ -6,6 +6,7 @@ scenes do the same work in other shares (docs/performance.md has how little). `p
 scene-costs` measures the costs anew, and says which of them no longer hold.
 """
 
+import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,6 +19,7 @@ from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 from scalpel_sim.validate.speed.measurements import CPU
+from tissue import MeshMeasures
 
 COSTS_FILE = Path(__file__).parent / "scene_costs.toml"
 """Costs of the scenes; `python -m benchmarks scene-costs --write` writes it."""
@@ -30,6 +32,12 @@ N_REPEATS = 5
 """Number of times that the same frames are done again; the median counts."""
 
 MILLISECOND = 1e-3
+
+COST_OF_FRAME = 0.25
+COST_OF_STEPS = 1.9e-4
+"""Costs of a simulated millisecond of a cut, in frames of the reference: of any, and of each
+tetrahedron and step that the body takes at rest. Fitted to the scenes, which keep within a factor
+of two of it: how much a blade adds depends on the path."""
 
 
 class ReferenceFrames:
@@ -77,3 +85,19 @@ def expected_factors(reference: float, costs: Mapping[str, float]) -> dict[str, 
         costs: Of each scene, as `scene_costs` returns them.
     """
     return {scene: MILLISECOND / (cost * reference) for scene, cost in costs.items()}
+
+
+def cost_of_body(measures: MeshMeasures) -> float:
+    """Return what a millisecond of a cut costs about, in frames of the reference."""
+    steps = math.ceil(MILLISECOND / measures.time_step)
+    return COST_OF_FRAME + COST_OF_STEPS * measures.n_tetrahedra * steps
+
+
+def factor_of_body(reference: float, measures: MeshMeasures) -> float:
+    """Return the real-time factor to expect of a cut, within a factor of two.
+
+    Args:
+        reference: Processor time of a reference frame on this machine [s].
+        measures: The body, before it is cut.
+    """
+    return MILLISECOND / (cost_of_body(measures) * reference)
