@@ -10,9 +10,12 @@ from .core.kernel_folder import cache_directory as cache_directory
 from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
+from .io.mesh_io import read_mesh_file as read_mesh_file
 from .io.whole_file import new_whole_file as new_whole_file
 from .io.whole_file import remove_unfinished as remove_unfinished
 from .io.whole_file import whole_file as whole_file
+from .mesh.faces import OUTWARD as OUTWARD
+from .mesh.faces import sorted_faces as sorted_faces
 from .mesh.pieces import components as components
 from .mesh.validation import quality as quality
 from .mesh.validation import signed_volumes as signed_volumes
@@ -35,8 +38,11 @@ __all__ = [
     "n_compiled_kernels",
     "new_whole_file",
     "quality",
+    "read_mesh_file",
     "remove_unfinished",
     "signed_volumes",
+    "OUTWARD",
+    "sorted_faces",
     "stuff_labels",
     "whole_file",
     "write_bundle",

@@ -65,21 +65,23 @@ def mesh(
     limits: LimitOptions = LimitOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Make tetrahedra that can be cut, from a surface or from a segmentation.
+    """Make tetrahedra that can be cut, from a surface, a segmentation, or a mesh to be repaired.
 
     Surfaces (STL, OBJ, PLY, GLB): holes are closed, parts that overlap become one body, and
     triangles may face either way. Label volumes (NIfTI, NRRD): each tetrahedron keeps its label,
-    and labels that touch share faces. It needs the extra `mesh` (pip install
-    'scalpel-sim[mesh]'). For example:
+    and labels that touch share faces. Tetrahedra of any file that `run --mesh` reads: nodes in the
+    same place are merged, and flat, inverted and sliver tetrahedra mended, or the skin is filled
+    anew. It needs the extra `mesh` (pip install 'scalpel-sim[mesh]'). For example:
 
     ```console
     scalpel-sim mesh liver.stl --scale 0.001 -o liver.vtu
     scalpel-sim mesh abdomen.nii.gz --keep-labels 3,5 --label 5=tumour -o liver.vtu
+    scalpel-sim mesh slivers.msh --scale 0.001 -o liver.vtu
     scalpel-sim run --mesh liver.vtu
     ```
 
     Args:
-        file: The surface, or the label volume.
+        file: The surface, the label volume, or the mesh.
         out: The mesh to write, a FILE.vtu [default: the name of the file, here, with .vtu].
         force: Replace the mesh if it exists.
     """
@@ -94,12 +96,13 @@ def _meshed(
     """Return the mesh that is made of a file, by what it is.
 
     Raises:
-        UsageError: it is none of those that are known, or has no use for an option.
+        UsageError: an option has no use for it, or it cannot be used.
     """
     from scalpel_sim.meshing.filling import fill
-    from scalpel_sim.meshing.label_volume import VOLUME_FILES, is_label_volume
+    from scalpel_sim.meshing.label_volume import is_label_volume
     from scalpel_sim.meshing.limited_process import ProcessLimits
     from scalpel_sim.meshing.meshed import Meshed
+    from scalpel_sim.meshing.repair import repaired
     from scalpel_sim.meshing.stuffing import stuff_volume
     from scalpel_sim.meshing.surface import SURFACE_FILES
 
@@ -107,11 +110,12 @@ def _meshed(
     if is_label_volume(file):
         _expect_none(given, ("tolerance", "coarsen"), f"{file} is a label volume")
         return stuff_volume(file, **given, on_progress=on_progress)
-    if file.suffix.lower() not in SURFACE_FILES:
-        known = ", ".join((*SURFACE_FILES, *VOLUME_FILES))
-        raise UsageError(f"{file}: expected a file that ends in {known}")
-    _expect_none(given, ("keep_labels", "label"), f"{file} is a surface")
+    is_surface = file.suffix.lower() in SURFACE_FILES
+    kind = "a surface" if is_surface else "no label volume"
+    _expect_none(given, ("keep_labels", "label"), f"{file} is {kind}")
     allowed = ProcessLimits(limits.time_limit, limits.memory_limit)
+    if not is_surface:
+        return repaired(file, **given, limits=allowed, on_progress=on_progress)
     filled = fill(file, **given, limits=allowed, on_progress=on_progress)
     return Meshed(filled.mesh, filled.notes())
 

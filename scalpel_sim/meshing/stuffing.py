@@ -10,7 +10,8 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from scalpel_sim.errors import UsageError
 from scalpel_sim.meshing.chosen_labels import chosen_labels
 from scalpel_sim.meshing.label_volume import LabelVolume, read_label_volume
-from scalpel_sim.meshing.meshed import Meshed, without_specks
+from scalpel_sim.meshing.mended_mesh import mended_mesh
+from scalpel_sim.meshing.meshed import Meshed
 from scalpel_sim.meshing.sizes import N_TETRAHEDRA
 from scalpel_sim.meshing.units import scale_of
 from tissue import BoolArray, FloatArray, IntArray
@@ -92,8 +93,10 @@ def stuff_volume(
     mesh = _stuffed(volume, len(numbers), float(cell), on_progress)
     assert mesh.labels is not None
     mesh = mesh._replace(labels=np.array([0, *numbers])[mesh.labels], label_names=chosen.names)
-    mesh, notes = without_specks(mesh)
-    return Meshed(mesh, (*volume.notes, *notes, *_lost(mesh, volume, numbers)))
+    on_progress("mending")
+    made = mended_mesh(mesh, float(np.linalg.norm(np.ptp(mesh.positions, axis=0))))
+    lost = _lost(made.mesh, volume, numbers)
+    return Meshed(made.mesh, (*volume.notes, *made.notes, *lost))
 
 
 def _lost(mesh: "TetrahedralMesh", volume: LabelVolume, numbers: Sequence[int]) -> list[str]:
