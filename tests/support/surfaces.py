@@ -115,3 +115,33 @@ REFUSED = {
     "in kilometres": (lambda: ball(1e-7), "Add --scale"),
 }
 """Surfaces that enclose no body, and what is said of them."""
+
+KINDS = ("thin", "hollow", "touching", "open", "noisy", "huge", "tiny", "bumpy")
+
+
+def of_a_kind(seed):
+    """A random surface of one kind, the kind, and how many metres its unit is."""
+    random = np.random.default_rng(seed)
+    kind = KINDS[seed % len(KINDS)]
+    mesh = ball(0.05, int(random.integers(2, 4)))
+    mesh.vertices *= random.uniform(0.5, 1.5, 3)
+    if kind == "thin":
+        mesh = trimesh.creation.box([0.06, 0.04, 10.0 ** random.uniform(-3.0, -2.3)])
+    elif kind == "hollow":
+        inner = mesh.copy()
+        inner.vertices *= random.uniform(0.3, 0.9)
+        mesh = both(mesh, inner)
+    elif kind == "touching":
+        mesh = both(
+            mesh, moved(mesh, [random.uniform(0.8, 1.0) * np.ptp(mesh.vertices[:, 0]), 0, 0])
+        )
+    elif kind == "open":
+        height = random.uniform(-0.2, 0.9) * mesh.vertices[:, 2].max()
+        mesh = of(mesh.vertices, mesh.faces[mesh.triangles_center[:, 2] < height])
+    elif kind == "noisy":
+        mesh = noisy(mesh, 10.0 ** random.uniform(-4.0, -2.5), seed)
+    elif kind == "bumpy":
+        waves = np.sin(mesh.vertices @ random.normal(0.0, 100.0, (3, 3))).sum(axis=1)
+        mesh = of(mesh.vertices * (1.0 + 0.1 * waves[:, None]), mesh.faces)
+    unit = {"huge": 1e-6, "tiny": 1e3}.get(kind, 1.0)
+    return of(mesh.vertices / unit, mesh.faces), kind, unit
