@@ -1,4 +1,7 @@
 from .arm.blade import Blade as Blade
+from .arm.flex import FlexBody as FlexBody
+from .arm.flex import FlexError as FlexError
+from .arm.flex import take_flex as take_flex
 from .arm.grasper import Grasper as Grasper
 from .arm.grasper import add_grasper as add_grasper
 from .arm.scalpel import add_scalpel as add_scalpel
@@ -39,6 +42,8 @@ __all__ = [
     "OBSERVATIONS",
     "LyingBody",
     "SCALPEL",
+    "FlexBody",
+    "FlexError",
     "SCENES",
     "STROKES",
     "Scene",
@@ -54,4 +59,5 @@ __all__ = [
     "prepare",
     "read_scene",
     "stroke_kind",
+    "take_flex",
 ]

@@ -19,6 +19,7 @@ from tissue.io.mesh_file import CellBlock, MeshFile, mesh_file
 from tissue.mesh.mesh_arrays import MeshError
 
 _KEYWORD = re.compile(rb"(?m)^[ \t]*\*(?!\*)[^\n]*")
+_UNPRINTABLE = re.compile(r"[^ -~]")
 _COMMENT = re.compile(rb"(?m)^[ \t]*\*\*[^\n]*$")
 _SOLID = re.compile(r"(?:C|DC|AC|EC|FC|QC)3D([0-9]+)[A-Z]*")
 
@@ -97,7 +98,8 @@ def _sections(data: bytes) -> Iterator[_Section]:
             if stop <= start:
                 break
             text, start = text.rstrip() + data[start:stop], stop
-        first, *words = (word.strip() for word in text.decode("latin-1").strip().split(","))
+        plain = _UNPRINTABLE.sub("?", text.decode("latin-1").strip())
+        first, *words = (word.strip() for word in plain.split(","))
         options = {}
         for word in words:
             key, _, value = word.partition("=")
@@ -243,7 +245,7 @@ def _of_lines(name: str, flat: IntArray, on_lines: IntArray) -> list[CellBlock]:
     starts, blocks = np.cumsum(on_lines) - on_lines, []
     for size in np.unique(on_lines).tolist():
         records = flat[starts[on_lines == size][:, None] + np.arange(size)]
-        kind = CellType(f"elements of type {name or 'unknown'}", 2, size - 1)
+        kind = CellType(f"elements of type {shown(name)}", 2, size - 1)
         blocks.append(CellBlock(kind, records[:, 1:], records[:, 0]))
     return blocks
 

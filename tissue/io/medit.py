@@ -68,7 +68,8 @@ def _read_text(data: bytes) -> MeshFile:
             has_end = True
             break
         if keyword == "Dimension":
-            _expect_dimension(reader, int(_numbers(reader, 1, "dimension")[0]), at)
+            (dimension,) = _whole(reader, _numbers(reader, 1, "dimension"), at).tolist()
+            _expect_dimension(reader, dimension, at)
             continue
         if keyword == "Vertices":
             if positions is not None:

@@ -160,6 +160,7 @@ def test_sections_say_which_sets_of_abaqus_are_labels_and_a_smaller_set_counts(t
         ("bdf", "GRID,7,,0.0", "GRID,7,,O.0", "expected a coordinate, found 'O.0'"),
         ("bdf", "GRID,8,", "GRID,7,", "node 7 occurs twice"),
         ("mesh", "Dimension 3", "Dimension 2", "expected dimension 3, found 2"),
+        ("mesh", "Dimension 3", "Dimension 1e999", "expected whole numbers, found inf"),
         ("mesh", "Tetrahedra\n48", "Tetrahedra\n47", "expected 235 numbers, found 240"),
     ],
 )
