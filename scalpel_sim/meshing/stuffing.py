@@ -38,8 +38,12 @@ SAMPLES_OF_CELL = 3.0
 VOLUME_ERROR = 0.003
 """Share of its volume in the file by which the volume of a label may differ before it is met."""
 
-MOST_FILLINGS = 5
+MOST_FILLINGS = 7
 """Meshes that are made to meet the volumes."""
+
+SHARE_OF_WAY = 0.6
+"""Share of the way to its volume by which a surface is moved at once. Where one label gains what
+its neighbour loses, both move their common surface: with the whole way they would go to and fro."""
 
 LARGEST_OFFSET = 0.4
 """Of a smoothed label, which goes from 0 to 1: a larger one would move the surface by more than the
@@ -135,10 +139,11 @@ def _stuffed(
         assert mesh.labels is not None
         volumes = signed_volumes(mesh.positions, mesh.tetrahedra)
         own = np.bincount(mesh.labels, volumes, minlength=n_labels + 1)[1:]
-        error = float(np.abs(own / wanted - 1.0).max())
+        # A label that is smaller than a cell is in no mesh: it must not decide which is best.
+        error = float(np.abs(own - wanted).sum() / wanted.sum())
         if error < least:
             best, least = mesh, error
-        if error < VOLUME_ERROR:
+        if np.abs(own / wanted - 1.0).max() < VOLUME_ERROR:
             break
         depths.grow(np.asarray(wanted - own, dtype=np.float64), _areas(mesh, n_labels))
     assert best is not None
@@ -208,7 +213,7 @@ class _Depths:
             areas: Of its surface [m2].
         """
         ways = lacking / np.maximum(areas, np.finfo(np.float64).tiny)
-        offsets = self._offsets[1:] + 2.0 * self._slope * ways
+        offsets = self._offsets[1:] + SHARE_OF_WAY * 2.0 * self._slope * ways
         self._offsets[1:] = np.clip(offsets, -LARGEST_OFFSET, LARGEST_OFFSET)
 
 
