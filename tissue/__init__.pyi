@@ -59,6 +59,7 @@ from .material_presets import Preset as Preset
 from .material_presets import SourcedValue as SourcedValue
 from .mesh.faces import boundary_faces as boundary_faces
 from .mesh.mesh_arrays import MeshError as MeshError
+from .mesh.pieces import piece_of_tetrahedra as piece_of_tetrahedra
 from .mesh.pieces import pieces_of as pieces_of
 from .mesh.rigid_cores import CoreCutError as CoreCutError
 from .mesh.rigid_cores import CoreMotion as CoreMotion
@@ -174,6 +175,7 @@ __all__ = [
     "lattice_block",
     "liver_lobe",
     "mesh_from_arrays",
+    "piece_of_tetrahedra",
     "pieces_of",
     "read_mesh",
     "report_on_mesh",

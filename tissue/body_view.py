@@ -5,12 +5,14 @@ from contextlib import contextmanager
 from typing import get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.elasticity.internal_forces import Elastic
 from tissue.fields.node_fields import largest_principal_strains, von_mises_stresses
 from tissue.fields.tetrahedron_fields import strains_of_tetrahedra, stresses_of_tetrahedra
 from tissue.integrators.model import TissueModel
+from tissue.loads.material_points import MaterialPoints, points_of
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
@@ -39,7 +41,13 @@ def snapshot_of(body: Body) -> Snapshot:
         body.added_masses[:n].copy(),
         body.tetrahedra[: body.n_tetrahedra].copy(),
         body.fixed[:n].copy(),
+        labels_of(body),
     )
+
+
+def labels_of(body: Body) -> IntArray:
+    """Return the label of each tetrahedron of a body, shape (n_tets,)."""
+    return np.asarray(body.materials.label[body.material[: body.n_tetrahedra]])
 
 
 def n_pieces_of(body: Body) -> int:
@@ -107,17 +115,16 @@ def _as_before(elastic: Elastic) -> Iterator[None]:
         array[:] = values_before
 
 
-def deformation_of(body: Body, elastic: Elastic, spring_modulus: float) -> Deformation:
+def deformation_of(body: Body, elastic: Elastic) -> Deformation:
     """Return stress and strain of each tetrahedron.
 
     Args:
         body: The body.
         elastic: Arrays from which the stress follows.
-        spring_modulus: Young's modulus in van Gelder's formula [Pa], where there are springs.
     """
     stresses, strains = np.zeros((2, body.n_tetrahedra, 3, 3))
     with _as_before(elastic):
-        stresses_of_tetrahedra(elastic, body, spring_modulus, stresses)
+        stresses_of_tetrahedra(elastic, body, stresses)
     strains_of_tetrahedra(body, strains)
     return Deformation(stresses, strains)
 
@@ -126,7 +133,7 @@ class BodyView:
     """What there is to read of the body of a `Tissue`."""
 
     material: Material
-    """What the body is made of."""
+    """What the body is made of; of several materials that which resists changes of volume most."""
     _model: TissueModel
 
     @property
@@ -172,8 +179,28 @@ class BodyView:
 
     def deformation(self) -> Deformation:
         """Return stress and strain of each tetrahedron now."""
-        modulus = self.material.spring_modulus
-        return deformation_of(self._body, self._model.elasticity.arrays, modulus)
+        return deformation_of(self._body, self._model.elasticity.arrays)
+
+    def material_points(self, where: str | npt.ArrayLike) -> MaterialPoints:
+        """Return points of the material, which move with it and survive cuts.
+
+        Args:
+            where: A region as text (`fixed_nodes`) or as a mask of nodes, shape (n_nodes,): the
+                centroids of the faces of the skin in it, each with its share of their area; or
+                numbers of nodes, shape (n,); or places in the body at rest [m], shape (n, 3).
+
+        Raises:
+            ValueError: no point is there, or one is outside the body.
+        """
+        return points_of(self._body, where)
+
+    def positions_of(self, points: MaterialPoints) -> FloatArray:
+        """Return where material points are now [m], shape (n, 3)."""
+        return points.positions(self._body)
+
+    def labels(self) -> IntArray:
+        """Return the label of each tetrahedron now, shape (n_tets,): 0 of meshes without labels."""
+        return labels_of(self._body)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""

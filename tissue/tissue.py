@@ -1,12 +1,13 @@
 """`Tissue`: a tetrahedral body that a blade can cut."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy.typing as npt
 
 from tissue.blade.prescribed_cut import checked_edges
 from tissue.blade_shape import BladeShape
+from tissue.body_materials import LabelKey, chosen, materials_of, scaled
 from tissue.body_view import BodyView
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact
@@ -16,15 +17,17 @@ from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
 from tissue.loads.attachment import Attachment, Ligament, ends_of_fibres
 from tissue.loads.load import Load
-from tissue.loads.material_points import MaterialPoints, points_of
+from tissue.loads.material_points import MaterialPoints
 from tissue.loads.support_path import SupportPath
 from tissue.material import Material
+from tissue.mesh.validation import expect_sound
 from tissue.solver_settings import SolverSettings
 from tissue.state.identity import Identity
 from tissue.state.tissue_state import Around, TissueState
 from tissue.stepping.acting_forces import ActingForce, acting_forces
 from tissue.stepping.assembly import assembled
 from tissue.stepping.checked_steps import CheckedSteps
+from tissue.stepping.material_changes import change_materials
 from tissue.types import Chunks, SchemeStatistics, StepResult, TetrahedralMesh
 
 
@@ -33,7 +36,8 @@ class Tissue(BodyView):
 
     Args:
         mesh: The body at rest.
-        material: What it is made of.
+        material: What it is made of: one material; or one for each label of the mesh, by number or
+            name, and by None for all others. They have the same law.
         fixed: The supports, which stay or move as `move_supports` says, shape (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
@@ -50,7 +54,7 @@ class Tissue(BodyView):
     def __init__(
         self,
         mesh: TetrahedralMesh,
-        material: Material | None = None,
+        material: Material | Mapping[LabelKey, Material] | None = None,
         *,
         fixed: BoolArray | None = None,
         positions: FloatArray | None = None,
@@ -59,14 +63,19 @@ class Tissue(BodyView):
         blade: BladeShape | None = None,
         solver: SolverSettings = SolverSettings(),
     ) -> None:
-        settings = (material or Material(), blade, floor, solver)
-        self.material, self.blade, self.floor, self.solver = settings
-        self._stages = assembled(mesh, fixed, positions, gravity, *settings)
+        mesh, averages_shear = expect_sound(mesh), solver.element == "averaged"
+        materials = materials_of(mesh, material or Material(), averages_shear=averages_shear)
+        self.material = materials.reference
+        self.label_names, others = mesh.label_names, (blade, floor, solver)
+        """Names of labels, of those that have one."""
+        self.blade, self.floor, self.solver = others
+        self._stages = assembled(mesh, fixed, positions, gravity, materials, *others)
         self._steps = CheckedSteps(self._stages)
         self._model = model = self._stages.model
         self.node_size = model.node_size
         """Mean node size of the body before any cut [m]."""
-        self._identity = Identity.of(model.body, model.surroundings.gravity, *settings)
+        gravity_now = model.surroundings.gravity
+        self._identity = Identity.of(model.body, gravity_now, materials.by_label, *others)
         self._spares = Spares()
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
@@ -120,23 +129,6 @@ class Tissue(BodyView):
         """
         self._steps.with_room(lambda: self._stages.take_edge(None))
         return self._stages.settle(self.floor)
-
-    def material_points(self, where: str | npt.ArrayLike) -> MaterialPoints:
-        """Return points of the material, which move with it and survive cuts.
-
-        Args:
-            where: A region as text (`fixed_nodes`) or as a mask of nodes, shape (n_nodes,): the
-                centroids of the faces of the skin in it, each with its share of their area; or
-                numbers of nodes, shape (n,); or places in the body at rest [m], shape (n, 3).
-
-        Raises:
-            ValueError: no point is there, or one is outside the body.
-        """
-        return points_of(self._body, where)
-
-    def positions_of(self, points: MaterialPoints) -> FloatArray:
-        """Return where material points are now [m], shape (n, 3)."""
-        return points.positions(self._body)
 
     def push(self, where: str | npt.ArrayLike | MaterialPoints, force: npt.ArrayLike) -> Load:
         """Push material points with a force, until `release`; return the load.
@@ -257,6 +249,30 @@ class Tissue(BodyView):
             ValueError: it does not act on this tissue, or was released before.
         """
         self._steps.begin_change().handles.release(held)
+
+    def set_material(
+        self, where: int | str | npt.ArrayLike | None = None, **factors: npt.ArrayLike
+    ) -> None:
+        """Multiply quantities of the material by factors, for example between two episodes.
+
+        Nodes keep their places and velocities; the blade lets go of the tissue, and the account of
+        energy begins again. The time step follows. Materials are a part of the state: `load_state`
+        puts them back. Factors of two calls multiply.
+
+        Args:
+            where: A label, by number or name; or a mask of tetrahedra, shape (n_tets,); None: all.
+            factors: Factors of `young_modulus`, `density`, `toughness`, `stiffening` or
+                `retardation_time`: a number, or one for each of these tetrahedra.
+
+        Raises:
+            ValueError: there is no such label or quantity, no tetrahedron is there, or a factor is
+                not finite and positive, or has another shape.
+        """
+        body = self._body
+        rows = body.material[: body.n_tetrahedra]
+        mask = chosen(body.materials, rows, self.label_names, where)
+        changed = scaled(body.materials, rows, mask, factors)
+        self._steps.with_room(lambda: change_materials(self._stages, *changed))
 
     def move_supports(self, where: str | npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """Move fixed nodes at a velocity, from the next step on until it is given again.

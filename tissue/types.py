@@ -263,6 +263,8 @@ class Snapshot(NamedTuple):
     """Node indices, shape (n_tets, 4)."""
     fixed: BoolArray
     """Whether each node is fixed, shape (n_nodes,)."""
+    labels: IntArray
+    """Label of each tetrahedron, shape (n_tets,); 0 in a mesh without labels."""
 
 
 class Deformation(NamedTuple):

@@ -16,7 +16,7 @@ from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_cut_surface
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.collapse import no_collapse
-from tissue.elasticity.finite_elements import no_solid, room_for_stars
+from tissue.elasticity.finite_elements import no_solid
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.mass_scaling import no_mass_scaling
 from tissue.elasticity.springs import (
@@ -26,6 +26,7 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
+from tissue.elasticity.stars import room_for_stars
 from tissue.elasticity.viscous_stress import no_viscosity
 from tissue.forces.attachments import no_attachments
 from tissue.forces.step_context import Damping, Stages, StepContext, new_stages, supports_at_rest
@@ -61,6 +62,7 @@ def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
     """Compute the masses of the body in place; return its springs."""
     n = body.n_nodes
     capacity = len(body.rest)
+    body.materials.spring_modulus[:] = young_modulus
     springs = no_springs(capacity, 40 * capacity + SPRING_POOL_MARGIN)
     written = build_rows(
         body,
@@ -68,8 +70,6 @@ def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
         springs,
         np.arange(n),
         n,
-        DENSITY,
-        young_modulus,
         np.zeros(LARGEST_STAR, dtype=np.int64),
     )
     assert written == n
@@ -113,7 +113,7 @@ def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
         springs=springs,
         solid=solid,
         viscosity=no_viscosity(solid, is_viscous=False),
-        collapsing=no_collapse(0, 0, 0.0),
+        collapsing=no_collapse(0, 0, is_needed=False),
         has_springs=1,
         has_tetrahedra=0,
         highest=0.0,

@@ -14,14 +14,13 @@ from tissue.elasticity.energy import solid_energy
 from tissue.elasticity.finite_elements import (
     Solid,
     averages_shear,
-    build_stars,
     build_tetrahedra,
     n_blocks,
     no_solid,
-    room_for_stars,
 )
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import deform_solid, solid_force, solid_forces
+from tissue.elasticity.stars import build_stars, room_for_stars
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks, relax_nodes
 from tissue.elasticity.viscous_stress import Viscosity, no_viscosity, viscous_corner_forces
 from tissue.laws.energy_density import (

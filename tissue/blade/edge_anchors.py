@@ -12,7 +12,13 @@ import numpy as np
 from tissue.blade.body_sheets import BodySheets, new_body_sheets
 from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
-from tissue.blade.toughness import ToughnessLaw, toughening_at
+from tissue.blade.toughness import (
+    ANCHOR,
+    SKIN,
+    TOUGHNESS,
+    ToughnessLaw,
+    toughening_at,
+)
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd_rows import natural
@@ -98,23 +104,29 @@ class Anchors(Arrays):
     spacing: float
     """Distance between samples next to each other [m]."""
     modulus: float
-    """Stiffness of the springs per length of edge [Pa]."""
+    """Stiffness of the springs per length of edge in the first material [Pa]."""
+    relative: FloatArray
+    """`ToughnessLaw.relative` of the tissue that each anchor is in, shape (n, 4)."""
     sheets: BodySheets
     """The sheet that each sample holds, of its run of samples (`find_sheets`)."""
 
 
-def anchor_stiffness(material: Material, toughness: float, node_size: float) -> float:
+def anchor_stiffness(
+    material: Material, toughness: float, node_size: float, young_modulus: float | None = None
+) -> float:
     """Return the stiffness of anchors per length of edge [Pa].
 
     Args:
         material: The tissue.
         toughness: Energy per area at which anchors slip [J/m2], the highest there is.
         node_size: Mean node size of the body [m].
+        young_modulus: Its stiffness [Pa]; None for that of the material.
     """
-    least = ANCHOR_STIFFNESS * material.young_modulus
+    modulus = material.young_modulus if young_modulus is None else young_modulus
+    least = ANCHOR_STIFFNESS * modulus
     if not material.stiffens:
         return least
-    most = LARGEST_STIFFNESS * material.young_modulus
+    most = LARGEST_STIFFNESS * modulus
     return min(max(least, toughness / (LONGEST_STRETCH * node_size)), most)
 
 
@@ -153,6 +165,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         stiffness=stiffness * length,
         spacing=float(spacing),
         modulus=float(stiffness),
+        relative=np.ones((n, 4)),
         sheets=new_body_sheets(n),
     )
 
@@ -218,10 +231,41 @@ def holding_weight(anchors: Anchors, k: int, i: int) -> float:
 def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area as it is now at which anchor `k` slips [J/m2]."""
     share: float = anchors.rest_share[k]
-    toughness: float = law.toughness * (1.0 + anchors.toughening[k])
+    relative = anchors.relative
+    toughness: float = relative[k, TOUGHNESS] * law.toughness * (1.0 + anchors.toughening[k])
     if anchors.at_skin[k]:
-        return share * max(law.skin_toughness, toughness)
+        toughness = max(relative[k, SKIN] * law.skin_toughness, toughness)
     return share * toughness
+
+
+@kernel
+def is_in_other_material(anchors: Anchors, body: Body, law: ToughnessLaw) -> bool:
+    """Return whether an anchor has come into tissue of another material."""
+    if len(law.relative) == 1:
+        return False
+    for k in range(len(anchors.state)):
+        if anchors.state[k] != FREE:
+            row = body.material[anchors.tetrahedron[k]]
+            for i in range(4):
+                if anchors.relative[k, i] != law.relative[row, i]:
+                    return True
+    return False
+
+
+@kernel
+def take_material(anchors: Anchors, body: Body, law: ToughnessLaw, k: int) -> None:
+    """Write the numbers of the material that anchor `k` is in."""
+    row = body.material[anchors.tetrahedron[k]]
+    for i in range(4):
+        anchors.relative[k, i] = law.relative[row, i]
+    anchors.stiffness[k] = anchor_modulus(anchors, k) * anchors.length[k]
+
+
+@inlined
+def anchor_modulus(anchors: Anchors, k: int) -> float:
+    """Return the stiffness of anchor `k` per length of edge [Pa]."""
+    modulus: float = anchors.relative[k, ANCHOR] * anchors.modulus
+    return modulus
 
 
 @kernel
@@ -245,7 +289,7 @@ def surplus_stretch(
     if distance == 0.0 or dot(stretch, pose.forward) < 0.0 or anchors.at_core[k]:
         return scale(0.0, stretch)
     across = dot(in_plane, pose.forward) / distance
-    surplus = distance - held_toughness(anchors, k, law) * across / anchors.modulus
+    surplus = distance - held_toughness(anchors, k, law) * across / anchor_modulus(anchors, k)
     return scale(max(surplus, 0.0) / distance, in_plane)
 
 

@@ -17,6 +17,7 @@ from tissue.blade.edge_anchors import (
     begin_account,
     pulling_point,
     stored_energy,
+    take_material,
 )
 from tissue.blade.material_frame import find_sheets, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
@@ -131,7 +132,7 @@ def anchor_beside(
             if _runs_in_slit(blade, body, visits, pose, t, p, ahead, slit_reach):
                 continue
             # Next to skin that is not broken it is skin too, or the edge broke in unopposed there.
-            _begin_anchor(anchors, body, k, t, p, anchors.at_skin[adjacent])
+            _begin_anchor(blade, body, k, t, p, anchors.at_skin[adjacent])
             join_sheet(anchors.sheets, k, adjacent)
             anchors.rest_share[k] = anchors.rest_share[adjacent]
             store(anchors.rest_area, k, vec3(anchors.rest_area, adjacent))
@@ -212,7 +213,7 @@ def anchor_entering(
         after = tetrahedra_along(body, grid, (pose.tip, pose.heel), n, k, stop, found)
         for sample in range(k, after):
             if found[sample] >= 0:
-                _enter(anchors, body, pose, sample, found[sample], slit_reach)
+                _enter(blade, body, pose, sample, found[sample], slit_reach)
         k = after
 
 
@@ -226,21 +227,23 @@ def _may_enter(anchors: Anchors, pose: BladePose, k: int, low: Vec3, high: Vec3)
 
 @kernel
 def _enter(
-    anchors: Anchors, body: Body, pose: BladePose, k: int, t: int, slit_reach: float
+    blade: BladeState, body: Body, pose: BladePose, k: int, t: int, slit_reach: float
 ) -> None:
     """Anchor sample `k` where it is, in tetrahedron `t`, unless it is in a slit there."""
-    b = sample_point(pose, k, len(anchors.state))
+    b = sample_point(pose, k, len(blade.anchors.state))
     w = barycentric_in(b, body.positions, body.tetrahedra, t)
     p = interpolate(w, body.rest, body.tetrahedra, t)
     if not is_in_slit(body, t, p, pose.along, pose.forward, slit_reach):
-        _begin_anchor(anchors, body, k, t, p, True)
+        _begin_anchor(blade, body, k, t, p, True)
 
 
 @kernel
-def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin: bool) -> None:
+def _begin_anchor(blade: BladeState, body: Body, k: int, t: int, p: Vec3, at_skin: bool) -> None:
     """Anchor sample `k`, which has not cut yet, at rest point `p` [m] of tetrahedron `t`."""
+    anchors = blade.anchors
     anchors.coarse.share[k] = 0.0
     set_anchor(anchors, body, k, t, p)
+    take_material(anchors, body, blade.toughness, k)
     anchors.slipped[k] = False
     anchors.is_new[k] = True
     anchors.pulls[k] = True

@@ -6,8 +6,10 @@ from tissue.blade.edge_anchors import (
     ANCHORED,
     anchors_energy,
     holding_node,
+    is_in_other_material,
     measure_toughening,
     n_holding_nodes,
+    take_material,
 )
 from tissue.blade.edge_forces import (
     add_anchor_stiffness,
@@ -76,13 +78,19 @@ def begin_blade_step(
     clear_impulses(blade.totals)
     for k in range(len(anchors.state)):
         anchors.cut[k] = 0.0
-    if blade.toughness.exponent == 0.0:  # then speed does not change the energy
-        measure_toughening(anchors, edge, dt, blade.toughness)
+    law = blade.toughness
+    is_other = is_in_other_material(anchors, body, law)
+    if law.exponent == 0.0 and not is_other:  # then nothing changes the energy
+        measure_toughening(anchors, edge, dt, law)
         return True
     before = edge_energy(blade, body, edge, 0.0)
-    measure_toughening(anchors, edge, dt, blade.toughness)
+    measure_toughening(anchors, edge, dt, law)
+    if is_other:
+        for k in range(len(anchors.state)):
+            take_material(anchors, body, law, k)
     measure_tip_speeds(blade.spine, edge, dt)
-    # A slower edge has a lower yield limit: the energy beyond it is spent on the next slip.
+    # A slower edge, and softer tissue, have a lower yield limit: the energy beyond it is spent on
+    # the next slip.
     after = edge_energy(blade, body, edge, 0.0)
     blade.totals.work_of_breaking += before - after
     return True

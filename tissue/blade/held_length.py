@@ -11,6 +11,7 @@ from tissue.blade.edge import BladePose
 from tissue.blade.edge_anchors import (
     ANCHORED,
     FREE,
+    anchor_modulus,
     anchor_position,
     pulling_point,
     stored_energy,
@@ -51,7 +52,7 @@ def measure_held_lengths(blade: BladeState, body: Body, pose: BladePose) -> None
             stretch = sub(pulling_point(anchors, pose, k), a)
             before = stored_energy(anchors, k, stretch, pose, law)
         anchors.length[k] = length
-        anchors.stiffness[k] = anchors.modulus * length
+        anchors.stiffness[k] = anchor_modulus(anchors, k) * length
         if is_counted:
             after = stored_energy(anchors, k, stretch, pose, law)
         blade.totals.released += before - after

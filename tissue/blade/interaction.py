@@ -15,14 +15,18 @@ from tissue.blade.blade_context import (
 )
 from tissue.blade.blade_state import new_blade_state
 from tissue.blade.edge import NOWHERE, Edge, is_other_length
-from tissue.blade.edge_anchors import anchor_stiffness, is_engaged, new_anchors
-from tissue.blade.faces_contact import grown_face_contacts, with_more_faces
+from tissue.blade.edge_anchors import (
+    anchor_stiffness,
+    is_engaged,
+    new_anchors,
+)
+from tissue.blade.faces_contact import FACE_STIFFNESS, grown_face_contacts, with_more_faces
 from tissue.blade.faces_search import forget_cells, forget_changed_faces
 from tissue.blade.forces import release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.spine_contact import new_spine_contacts
 from tissue.blade.spine_search import relocate_spine
-from tissue.blade.toughness import toughness_law_of
+from tissue.blade.toughness import toughness_law_of, toughness_of_materials
 from tissue.blade.wrench import contacts_of, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
@@ -31,6 +35,7 @@ from tissue.cutting.blade_path import Path
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.node_motion import Moved, forget_moved
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import build_grid, no_grid
@@ -68,8 +73,7 @@ class BladeInteraction:
     ) -> None:
         self._node_size = node_size
         toughness = toughness_law_of(material, blade).skin_toughness
-        self._stiffness = anchor_stiffness(material, toughness, node_size)
-        anchors = new_anchors(2, 1.0, self._stiffness)
+        anchors = new_anchors(2, 1.0, anchor_stiffness(material, toughness, node_size))
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
         """State for the kernels; replaced by another object when arrays grow."""
         self._shape, self._material = blade, material
@@ -87,6 +91,28 @@ class BladeInteraction:
         """Make a report with room for all contacts that the blade may have."""
         self.latest_report = new_report(self.state, self._n_fibres)
         self._views: dict[int, RigidContacts] = {}
+
+    def take_materials(self, materials: MaterialArrays) -> None:
+        """Take the materials of the body: the toughness and the stiffness of each."""
+        toughness, skin = toughness_of_materials(materials, self._shape)
+        numbers = (materials, self._material, self._shape, self._node_size)
+        stiffest = float(materials.young_modulus.max())
+        stiffness = FACE_STIFFNESS * stiffest / self._node_size
+        self.state = self.state.replaced(
+            toughness=self.state.toughness.replaced(
+                toughness=float(toughness[0]),
+                skin_toughness=float(skin[0]),
+                relative=relative_numbers(*numbers),
+            ),
+            sides=self.state.sides.replaced(stiffness=stiffness),
+        )
+
+    def _first_of(self, materials: MaterialArrays) -> Material:
+        """Return the first material of the body, over which numbers of others are given."""
+        if materials.n == 1:
+            return self._material
+        modulus, ratio = float(materials.young_modulus[0]), float(materials.poisson_ratio[0])
+        return self._material.changed(young_modulus=modulus, poisson_ratio=ratio)
 
     def make_room_for_fibres(self, n: int) -> None:
         """Make room for that many contacts with fibres."""
@@ -153,10 +179,13 @@ class BladeInteraction:
         """
         release_edge(self.state, body, *self.edge_now)
         n = math.ceil(length / self._node_size * SAMPLES_PER_NODE_SIZE) + 1
-        anchors = new_anchors(max(n, 2), length, self._stiffness)
+        first = self._first_of(body.materials)
+        toughness = self.state.toughness.skin_toughness
+        stiffness = anchor_stiffness(first, toughness, self._node_size)
+        anchors = new_anchors(max(n, 2), length, stiffness)
         self.state = self.state.replaced(anchors=anchors)
         if self._shape is not None and length > 0.0:
-            where = (self._shape, length, self._material, self._node_size)
+            where = (self._shape, length, first, self._node_size)
             self.state = self.state.replaced(spine=new_spine_contacts(*where))
         self._renew_report()
         self.edge_length = length
@@ -298,3 +327,25 @@ class BladeInteraction:
         """Forget the nodes that moved where a search has listed their tetrahedra."""
         if moved is not None and outcome != NOT_SEARCHED:
             forget_moved(moved)
+
+
+def relative_numbers(
+    materials: MaterialArrays, material: Material, shape: BladeShape | None, node_size: float
+) -> FloatArray:
+    """Return `ToughnessLaw.relative` of the materials of a body.
+
+    Args:
+        materials: The materials.
+        material: Whose law they have.
+        shape: Shape of the blade; None for a line.
+        node_size: Mean node size of the body [m].
+    """
+    toughness, skin = toughness_of_materials(materials, shape)
+    moduli = materials.young_modulus
+    anchors = [
+        anchor_stiffness(material, skin[i], node_size, float(moduli[i])) for i in range(len(skin))
+    ]
+    columns = (toughness, skin, np.array(anchors), moduli / (1.0 - materials.poisson_ratio**2))
+    # Of 0, tissue that nothing cuts: all of it is.
+    firsts = [column[0] or 1.0 for column in columns]
+    return np.stack([column / first for column, first in zip(columns, firsts, strict=True)], axis=1)

@@ -21,7 +21,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.blade.edge import BladePose, Edge, pose_at
-from tissue.blade.toughness import ToughnessLaw, skin_toughness_at, toughness_at
+from tissue.blade.toughness import (
+    SIDE,
+    SKIN,
+    TOUGHNESS,
+    ToughnessLaw,
+    skin_toughness_at,
+    toughness_at,
+)
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
@@ -105,6 +112,8 @@ class SpineContacts(Arrays):
     shape (n, 2)."""
     energy: FloatArray
     """Energy stored in the sample when slip was applied last [J], shape (n,)."""
+    relative: FloatArray
+    """`ToughnessLaw.relative` of the tissue that each sample touches, shape (n, 4)."""
     speed: FloatArray
     """Speed at which the tip's end moves outward in this step [m/s], shape (n,); 0 of other
     sides. It decides the toughness, as that of the edge does."""
@@ -205,7 +214,8 @@ def fit_stiffness(spine: SpineContacts, body: Body, k: int, normal: Vec3) -> Non
     for q in range(4):
         node = vec3(body.positions, body.tetrahedra[spine.tetrahedron[k], q])
         mean_square += spine.weights[k, q] * dot(sub(node, point), normal) ** 2
-    spine.stiffness[k] = strip_stiffness(spine.law, mean_square) * spine.length[k]
+    stiffness = spine.relative[k, SIDE] * strip_stiffness(spine.law, mean_square)
+    spine.stiffness[k] = stiffness * spine.length[k]
 
 
 def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> SpineContacts:
@@ -226,6 +236,7 @@ def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> SpineCont
         rest=np.zeros((n, 3)),
         held=np.zeros((n, 2)),
         energy=np.zeros(n),
+        relative=np.ones((n, 4)),
         speed=np.zeros(n),
     )
 
@@ -306,8 +317,10 @@ def piercing_depth(spine: SpineContacts, k: int, law: ToughnessLaw) -> float:
 def tip_toughness(spine: SpineContacts, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area at which sample `k` of the tip's end pierces [J/m2]."""
     if spine.state[k] == PIERCING:
-        return toughness_at(law, spine.speed[k])
-    return skin_toughness_at(law, spine.speed[k])
+        toughness: float = spine.relative[k, TOUGHNESS] * toughness_at(law, spine.speed[k])
+    else:
+        toughness = spine.relative[k, SKIN] * skin_toughness_at(law, spine.speed[k])
+    return toughness
 
 
 @kernel

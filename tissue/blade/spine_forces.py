@@ -146,9 +146,10 @@ def _pierce(
     before = press_energy(spine, k, press_of(spine, k, side, normal, p, law))
     spine.state[k] = PIERCING
     again = press_of(spine, k, side, normal, p, law)
+    toughness = tip_toughness(spine, k, law)
     is_inside = _move_by(blade, body, visits, k, scale(again.surplus, side.outward))
     moved = sub(touched_point(spine, body, body.positions, k), p)
-    cost = tip_toughness(spine, k, law) * spine.length[k] * max(dot(moved, side.outward), 0.0)
+    cost = toughness * spine.length[k] * max(dot(moved, side.outward), 0.0)
     left = 0.0
     if is_inside:
         q = touched_point(spine, body, body.positions, k)

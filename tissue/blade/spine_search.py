@@ -21,7 +21,6 @@ from tissue.blade.spine_contact import (
     IDLE,
     PIERCING,
     PRESSING,
-    SpineContacts,
     SpineSide,
     fit_stiffness,
     press_energy,
@@ -163,7 +162,7 @@ def _take_point(
         skin: The point.
     """
     spine = blade.spine
-    _set_point(spine, body, k, skin.face // 4, skin.weights)
+    _set_point(blade, body, k, skin.face // 4, skin.weights)
     fit_stiffness(spine, body, k, pose.normal)
     point = touched_point(spine, body, body.positions, k)
     press = press_of(spine, k, side, pose.normal, point, blade.toughness)
@@ -172,8 +171,11 @@ def _take_point(
 
 
 @kernel
-def _set_point(spine: SpineContacts, body: Body, k: int, t: int, w: Weights) -> None:
+def _set_point(blade: BladeState, body: Body, k: int, t: int, w: Weights) -> None:
     """Write the point that sample `k` touches, by its weights in tetrahedron `t`."""
+    spine, row = blade.spine, body.material[t]
+    for i in range(4):
+        spine.relative[k, i] = blade.toughness.relative[row, i]
     spine.tetrahedron[k] = t
     spine.weights[k, 0], spine.weights[k, 1] = w.a, w.b
     spine.weights[k, 2], spine.weights[k, 3] = w.c, w.d
@@ -285,7 +287,7 @@ def move_point(blade: BladeState, body: Body, visits: Visits, k: int, p: Vec3) -
     spine = blade.spine
     location = locate(body, visits, p, spine.tetrahedron[k], blade.queue)
     t = location.tetrahedron
-    _set_point(spine, body, k, t, clipped(barycentric_in(p, body.rest, body.tetrahedra, t)))
+    _set_point(blade, body, k, t, clipped(barycentric_in(p, body.rest, body.tetrahedra, t)))
     return location.inside
 
 

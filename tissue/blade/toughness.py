@@ -3,16 +3,23 @@
 import logging
 import math
 
+import numpy as np
+
 from tissue.blade_shape import BladeShape
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.material import Material
+from tissue.mesh.material_table import MaterialArrays
 
 TOUGHEST = {"springs": 0.6, "neo_hookean": 2.0}
 """Toughness over Young's modulus, in mean node sizes, up to which steady forces are within 5 % of
 toughness times depth. Springs were 2 to 9 % high at 0.8 and 57 % at 1.5, where the blade paid for
 60 % of what it opened. Tetrahedra were within 3 % at 2.3, but there the force of the first
 centimetres dropped to 58 %. Laws that stiffen have no such limit."""
+
+TOUGHNESS, SKIN, ANCHOR, SIDE = range(4)
+"""Columns of `ToughnessLaw.relative`."""
 
 _log = logging.getLogger("tissue")
 
@@ -28,6 +35,9 @@ class ToughnessLaw(Arrays):
     """Exponent of the dependence on speed; 0 for none."""
     doubling_speed: float
     """Speed at which the toughness is twice that of a slow cut [m/s]."""
+    relative: FloatArray
+    """Numbers of each material of the body over those of the first, shape (n_materials, 4):
+    toughness, skin toughness, stiffness of anchors, and of blunt sides (`TOUGHNESS` and so on)."""
 
 
 def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessLaw:
@@ -43,7 +53,17 @@ def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessL
         skin_toughness=float(max(material.skin_toughness, material.toughness) + blunt),
         exponent=float(material.toughness_exponent),
         doubling_speed=float(material.toughness_speed),
+        relative=np.ones((1, 4)),
     )
+
+
+def toughness_of_materials(
+    materials: MaterialArrays, shape: BladeShape | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return toughness and skin toughness of each material for this edge [J/m2]."""
+    layer = 0.0 if shape is None else 2.0 * shape.edge_radius
+    blunt, toughness = layer * materials.work_to_rupture, materials.toughness
+    return toughness + blunt, np.maximum(materials.skin_toughness, toughness) + blunt
 
 
 @kernel

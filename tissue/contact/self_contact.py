@@ -91,7 +91,6 @@ class SelfContact:
         adds_mass: bool = False,
     ) -> None:
         n_nodes = len(body.rest)
-        added = max(ADDED_SHARE * frequency_squared, LEAST_ADDED)
         faces = new_faces(len(body.tetrahedra))
         of_nodes = ("inverted_step", "is_due", "contact", "n_contacts", "listed_at")
         self.search = SearchState(
@@ -133,12 +132,20 @@ class SelfContact:
             floor=-np.inf if floor is None else float(floor),
         )
         """Data of the search; another struct where its arrays grow."""
-        time = RETARDATION_TIME / np.sqrt(added)
-        self.limits = new_limits(node_size, added, adds_mass=adds_mass)
-        """Limits of the stiffness and the recovery of contacts."""
-        self.forces = new_penalty_forces(n_nodes, friction, time)
+        self.forces = new_penalty_forces(n_nodes, friction, 0.0)
+        self._node_size, self._adds_mass = node_size, adds_mass
+        self.take_frequency(frequency_squared)
         self._search_contacts = SameTypes(search_contacts)
         self._find_pieces(body)
+
+    def take_frequency(self, frequency_squared: float) -> None:
+        """Set stiffness and damping for a body of that bound on w^2 before any cut [1/s2]."""
+        added = max(ADDED_SHARE * frequency_squared, LEAST_ADDED)
+        self.limits = new_limits(self._node_size, added, adds_mass=self._adds_mass)
+        """Limits of the stiffness and the recovery of contacts."""
+        time = float(RETARDATION_TIME / np.sqrt(added))
+        self.forces.damping_time[:] = time
+        self.forces = self.forces.replaced(retardation_time=time)
 
     @property
     def is_touching(self) -> bool:

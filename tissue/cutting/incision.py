@@ -12,6 +12,7 @@ from tissue.cutting.workspace import Scheme, SnapLimits
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.star import LARGEST_STAR, Visits
+from tissue.mesh.validation import signed_volumes
 from tissue.types import TissueError
 
 INCREMENT = 0.25
@@ -245,21 +246,24 @@ LARGEST_FRAGMENT = 0.125
 none."""
 
 
-def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size: float) -> Scheme:
+def scheme_of(name: str, cut: CutSettings, body: Body, node_size: float) -> Scheme:
     """Return the scheme of that name.
 
     Args:
         name: `stellar` or `paper`.
         cut: How closely cuts follow the blade, where the scheme lets one choose.
         body: The body to be cut; whole.
-        density: Mass per volume at rest [kg/m3].
         node_size: Mean node size of the body [m].
     """
     if name == "paper":  # imported late: its kernels would cost every start 0.8 s
         from tissue.cutting.bielser_1998.scheme import PaperScheme
 
-        return PaperScheme(body, density, node_size)
-    volume = body.masses.sum() / density
+        return PaperScheme(body, node_size)
+    materials, n = body.materials, body.n_tetrahedra
+    if materials.n == 1:
+        volume = body.masses.sum() / materials.density[0]
+    else:
+        volume = signed_volumes(body.rest, body.tetrahedra[:n]).sum()
     lengths = SnapLimits(
         snap=float(cut.snap),
         floor=float(cut.floor * node_size),

@@ -13,7 +13,7 @@ from tissue.cutting.workspace import Cut
 from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
-from tissue.mesh.body import local_index
+from tissue.mesh.body import local_index, relative_density
 from tissue.mesh.changes import PASS_NODES, SPARE_NODES, note_child, note_dirty
 from tissue.mesh.star import edge_star
 
@@ -186,7 +186,8 @@ def _note_spin(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3, n
     """Store the rotation of the ends about the new node: it has a share of their masses now."""
     body, volume = cut.body, 0.0
     for i in range(n):
-        volume += tetrahedron_volume(body.rest, body.tetrahedra, cut.scratch.parents[i])
+        t = cut.scratch.parents[i]
+        volume += relative_density(body, t) * tetrahedron_volume(body.rest, body.tetrahedra, t)
     place, velocity = vec3(body.positions, node), vec3(body.velocities, node)
     for e in range(n_ends):
         end = _pick(e, a, b, c)
@@ -211,6 +212,7 @@ def _make_children(cut: Cut, i: int, n_ends: int, a: int, b: int, c: int, node: 
         decide_side(cut.surface, child, side)
         note_dirty(cut.change, child)
         if child != parent:
+            body.material[child] = body.material[parent]
             note_child(cut.change, child, parent)
     for e in range(n_ends):
         child = scratch.children[i, e]

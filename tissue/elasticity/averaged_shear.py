@@ -49,7 +49,8 @@ from tissue.core.simd_columns import (
 )
 from tissue.core.simd_rows import larger, natural
 from tissue.core.vec3 import Vec3, dot, scale
-from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.finite_elements import Solid, is_graded
+from tissue.elasticity.graded import lam_of_nodes, law_of_nodes, shear_of_nodes
 from tissue.elasticity.relaxed_stress import relaxes, with_relaxed
 from tissue.elasticity.stress import MatrixRows, cofactors_of, shear_stiffness, stress_of
 from tissue.laws.kernels import (
@@ -145,27 +146,38 @@ def _write_stresses(solid: Solid, first: int, has_stiffened: bool, has_relaxed: 
     x, y, z = gradient
     cofactors = cofactors_of(x, y, z)
     q = stretch_invariant(x, y, z, *cofactors)
-    share = splat(law.shear_of_nodes, q)
-    modulus = splat(law.shear_modulus, q)
+    share, modulus = splat(law.shear_of_nodes, q), shear_of_nodes(solid, first, q)
     taken, stiffness_taken = taken_back(averaged_q, q)
+    of_block = law_of_nodes(solid, first, q)
     if has_stiffened:
         s = splat(0.0, q)
-        factor = stiffening_factor(law, q)
-        stiffness, _ = shear_stiffness(law, q, factor, gradient, cofactors)
+        factor = stiffening_factor(of_block, q)
+        stiffness, _ = shear_stiffness(of_block, q, factor, gradient, cofactors)
+        stiffness = where_averaged(solid, first, stiffness)
         store_block(solid.node_stiffness, first, stiffness)
         rest = share * modulus * (factor - taken)
     else:
-        s = share * isotropic_factor(law, x.x + y.y + z.z, x, y, z)
+        s = share * isotropic_factor(of_block, x.x + y.y + z.z, x, y, z)
         rest = share * modulus * (splat(1.0, q) - taken)
+    stiffness_taken = where_averaged(solid, first, stiffness_taken)
     store_block(solid.stiffness_taken, first, stiffness_taken)
     px, py, pz = stress_of(rest + s, splat(-1.0, s) * rest, s, gradient, cofactors)
     if has_relaxed:
         minus = splat(-1.0, q)
         px, py, pz = with_relaxed(solid.node_relaxed, first, minus, (px, py, pz), gradient)
-    pressure = splat(law.lam_of_nodes, s) * dilatation
+    pressure = lam_of_nodes(solid, first, s) * dilatation
     taken = share * modulus * taken
     columns = (px.x, px.y, px.z, py.x, py.y, py.z, pz.x, pz.y, pz.z, pressure, taken)
     store_columns(solid.node_stress, first, columns)
+
+
+@inlined
+def where_averaged(solid: Solid, first: int, values: Lanes) -> Lanes:
+    """Return the values of a vector of nodes, 0 where nothing is averaged around a node."""
+    if not is_graded(solid):
+        return values
+    mixed = gathered_like(values, solid.node_is_mixed, solid.every, first)
+    return values * (splat(1.0, values) - mixed)
 
 
 @inlined
@@ -252,7 +264,7 @@ def _energies(solid: Solid, first: int) -> Lanes:
     q = stretch_invariant(x, y, z, cx, cy, cz)
     one = splat(1.0, q)
     if stiffens(law):
-        w = stretch_energy(law, q)
+        w = stretch_energy(law_of_nodes(solid, first, q), q)
     else:
         trace = x.x + y.y + z.z
         grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
@@ -262,5 +274,6 @@ def _energies(solid: Solid, first: int) -> Lanes:
     u = splat(0.5 / SPREAD_LIMIT, q) * larger(averaged_q - q, splat(0.0, q))
     taken = u - splat(2.0, q) * logarithm(one + u) + u / (one + u)
     volume = gathered_like(w, solid.node_volume, solid.every, first)
-    w = splat(0.5 * law.mu, w) * w + splat(law.shear_modulus * SPREAD_LIMIT, w) * taken
+    mu, spread = law_of_nodes(solid, first, w).mu, splat(SPREAD_LIMIT, w)
+    w = splat(0.5, w) * mu * w + spread * shear_of_nodes(solid, first, w) * taken
     return splat(law.shear_of_nodes, w) * volume * w

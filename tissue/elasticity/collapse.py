@@ -52,8 +52,8 @@ _UNKNOWN: Final = -1.0
 class Collapsing(Arrays):
     """The tetrahedra that are pressed flat, and how much they resist."""
 
-    modulus: float
-    """Young's modulus [Pa]; 0 where tetrahedra do not need this."""
+    is_needed: IntCell
+    """1 where tetrahedra of springs are kept from turning inside out, else 0."""
     n: IntCell
     """Number of tetrahedra that are listed."""
     slack: FloatCell
@@ -72,16 +72,16 @@ class Collapsing(Arrays):
     """For a search and for what they add to w^2 of a node, shape (node capacity,)."""
 
 
-def no_collapse(n_nodes: int, n_tetrahedra: int, modulus: float) -> Collapsing:
+def no_collapse(n_nodes: int, n_tetrahedra: int, *, is_needed: bool) -> Collapsing:
     """Return that nothing is flat, with room for that many nodes and tetrahedra.
 
     Args:
         n_nodes: Room for nodes.
         n_tetrahedra: Room for tetrahedra.
-        modulus: Young's modulus [Pa]; 0 where tetrahedra do not need this.
+        is_needed: Whether tetrahedra need this.
     """
     sizes = {"nodes": n_nodes, "tetrahedra": n_tetrahedra}
-    return Collapsing.new(sizes, modulus=float(modulus), slack=_UNKNOWN)
+    return Collapsing.new(sizes, is_needed=int(is_needed), slack=_UNKNOWN)
 
 
 class _Shape(NamedTuple):
@@ -126,7 +126,7 @@ def renew_collapsing(
         n: How many these are.
         highest: Bound on w^2 of the body at rest [1/s2].
     """
-    if collapsing.modulus == 0.0:
+    if collapsing.is_needed == 0:
         return
     for i in range(n):
         t = tetrahedra[i]
@@ -169,7 +169,7 @@ def find_collapsing(
         node_size: Of the smallest node [m].
         seconds: Length of the increment [s].
     """
-    if collapsing.modulus == 0.0:
+    if collapsing.is_needed == 0:
         return
     seconds *= INCREMENTS_AHEAD
     fall = FASTEST_CHANGE / node_size * seconds
@@ -259,7 +259,8 @@ def _stiffness(collapsing: Collapsing, body: Body, shape: _Shape, t: int, highes
     most = 0.0
     for q in range(4):
         most = max(most, _frequency_at(collapsing, body, shape, t, q))
-    k = collapsing.modulus / (6.0 * abs(collapsing.per_volume[t]))
+    modulus = body.materials.young_modulus[body.material[t]]
+    k = modulus / (6.0 * abs(collapsing.per_volume[t]))
     if k * most > LARGEST_ADDED_SHARE * highest:  # not where all of its nodes are fixed
         k = LARGEST_ADDED_SHARE * highest / most
     stiffness: float = k

@@ -9,11 +9,11 @@ from tissue.core.jit import SameTypes
 from tissue.elasticity.collapse import no_collapse, renew_collapsing
 from tissue.elasticity.finite_elements import (
     averages_shear,
-    build_stars,
     build_tetrahedra,
+    graded_solid,
     grown_solid,
+    is_graded,
     no_solid,
-    room_for_stars,
 )
 from tissue.elasticity.frequency.changes import (
     forget_added_mass,
@@ -21,6 +21,7 @@ from tissue.elasticity.frequency.changes import (
     update_frequencies,
 )
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
+from tissue.elasticity.graded import write_moduli
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
@@ -30,12 +31,14 @@ from tissue.elasticity.mass_scaling import (
 )
 from tissue.elasticity.relaxed_stress import inherit_at_nodes, inherit_relaxed
 from tissue.elasticity.springs import build_rows, no_springs
+from tissue.elasticity.stars import build_stars, room_for_stars
 from tissue.elasticity.viscous_stress import grown_viscosity, no_viscosity
 from tissue.laws.energy_density import averaged_shear, volume_term
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.material_table import OF_LAW, OF_STIFFENING
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 ROOM_FOR_SPRINGS = 1 << 16
@@ -49,8 +52,8 @@ class Elasticity:
     """Springs and elements of a body, and a bound on its frequencies.
 
     Args:
-        material: What the body is made of.
-        body: The body; its masses are written.
+        material: What the body is made of; of several materials the one whose law they have.
+        body: The body, with its materials; its masses are written.
         visits: For searches.
         mass_scaling: Angular frequency [1/s] above which nodes get mass where tetrahedra carry the
             shear; None for no added mass. Where the uncut body has a higher one, that: only what a
@@ -72,7 +75,6 @@ class Elasticity:
         averages_shear: bool = False,
         resists_collapse: bool = True,
     ) -> None:
-        self._density, self._spring_modulus = material.density, material.spring_modulus
         self._relaxes = bool(material.prony)
         self._update_frequencies = SameTypes(update_frequencies)
         self._renew_collapsing = SameTypes(renew_collapsing)
@@ -91,17 +93,26 @@ class Elasticity:
         self._may_collapse = law is None and resists_collapse
         law_or_none = law or volume_term(0.0)
         slots = room_for_stars(*room)
-        solid = no_solid(law_or_none, *room, slots, prony=material.prony, is_single=is_single)
-        is_viscous = material.retardation_time > 0.0 and not self._has_springs
+        retardation_time = float(body.materials.retardation_time.max())
+        solid = no_solid(
+            law_or_none,
+            *room,
+            slots,
+            prony=material.prony,
+            is_single=is_single,
+            is_graded=law is not None and body.materials.is_even == 0,
+            retardation_time=retardation_time,
+        )
+        is_viscous = retardation_time > 0.0 and not self._has_springs
         self.arrays = Elastic.new(
             {"nodes": n_nodes},
             springs=no_springs(*room_for_springs),
             solid=solid,
             viscosity=no_viscosity(solid, is_viscous=is_viscous),
             collapsing=(
-                no_collapse(n_nodes, n_tetrahedra, material.young_modulus)
+                no_collapse(n_nodes, n_tetrahedra, is_needed=True)
                 if self._may_collapse
-                else no_collapse(0, 0, 0.0)
+                else no_collapse(0, 0, is_needed=False)
             ),
             has_springs=int(self._has_springs),
             has_tetrahedra=int(law is not None),
@@ -110,11 +121,35 @@ class Elasticity:
         self._has_solid = law is not None
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
-        if mass_scaling is not None and not material.law.has_springs:
+        self._mass_scaling = None if self._has_springs else mass_scaling
+        self._limit_frequencies(body)
+
+    def _limit_frequencies(self, body: Body) -> None:
+        """Set the limit above which nodes get mass, where they do; none has any yet."""
+        if self._mass_scaling is not None:
             scaling = self.arrays.scaling
-            scaling.allowed = max(mass_scaling**2, self.arrays.highest_of_tetrahedra)
+            scaling.allowed = max(self._mass_scaling**2, self.arrays.highest_of_tetrahedra)
             scaling.allowed_between_cuts = scaling.allowed_where_strained = scaling.allowed
-            scaling.most = LARGEST_ADDED_MASS * float(body.masses[:n_nodes].sum())
+            scaling.most = LARGEST_ADDED_MASS * float(body.masses[: body.n_nodes].sum())
+
+    def take_materials(self, body: Body, visits: Visits) -> None:
+        """Write all anew after a change of the materials: masses, moduli and bounds."""
+        materials, arrays, solid = body.materials, self.arrays, self.arrays.solid
+        if self._has_solid:
+            if materials.is_even == 0:
+                solid = graded_solid(solid)
+            law = {name: float(getattr(materials, name)[0]) for name in (*OF_LAW, *OF_STIFFENING)}
+            solid = solid.replaced(
+                law=solid.law if is_graded(solid) else solid.law.replaced(**law),
+                retardation_time=float(materials.retardation_time.max()),
+            )
+        self.arrays = arrays = arrays.replaced(solid=solid, scaling=no_mass_scaling())
+        arrays.highest = arrays.highest_of_tetrahedra = arrays.highest_of_dampers = 0.0
+        n_nodes = body.n_nodes
+        body.added_masses[:n_nodes] = 0.0
+        solid.weight[:] = 0.0  # they depend on the masses of before
+        self._write(body, visits, np.arange(body.n_tetrahedra), np.arange(n_nodes))
+        self._limit_frequencies(body)
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Update masses, springs, elements and bounds after a pass of a cut."""
@@ -122,7 +157,7 @@ class Elasticity:
         if self._relaxes:
             inherit_relaxed(self.arrays.solid, change.children, change.n_children)
         self._write(body, visits, change.dirty[: change.n_dirty], nodes)
-        _RETURN_SPIN.call(body, change, self._density, nodes, len(nodes))
+        _RETURN_SPIN.call(body, change, nodes, len(nodes))
 
     def before_cut(self, body: Body) -> None:
         """Note the momentum of added mass before the mesh changes; see `after_cut`."""
@@ -195,20 +230,20 @@ class Elasticity:
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
+            write_moduli(self.arrays.solid, body, nodes, n)
             if self._relaxes and averages_shear(self.arrays.solid):
                 inherit_at_nodes(self.arrays.solid, nodes, n)
         if not self._has_springs:
-            write_masses(body, self.arrays.solid, nodes, n, self._density)
+            write_masses(body, self.arrays.solid, nodes, n)
         self._update_frequencies.call(self.arrays, body, visits, nodes, n)
         collapsing, highest = self.arrays.collapsing, self.arrays.highest
         self._renew_collapsing.call(collapsing, body, tetrahedra, len(tetrahedra), highest)
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
-        density, modulus = self._density, self._spring_modulus
         left = nodes
         while True:
             springs = self.arrays.springs
-            rows = (body, visits, springs, left, len(left), density, modulus, self._around)
+            rows = (body, visits, springs, left, len(left), self._around)
             left = left[_BUILD_ROWS.call(*rows) :]
             if not len(left):
                 return

@@ -34,7 +34,25 @@ from tissue.core.simd_rows import larger
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.averaged_shear import averages_of, shear_energy_of_nodes
 from tissue.elasticity.collapse import collapse_energy
-from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear, n_blocks
+from tissue.elasticity.finite_elements import (
+    BULK,
+    N_RELAXED,
+    VOLUME,
+    Solid,
+    averages_shear,
+    is_graded,
+    n_blocks,
+)
+from tissue.elasticity.graded import (
+    NO_MODULUS,
+    law_of_block,
+    law_of_nodes,
+    modulus_of,
+    modulus_of_node,
+    own_lam_of,
+    own_share_of,
+    shear_modulus_of,
+)
 from tissue.elasticity.gradients import known_gradient, shape_of
 from tissue.elasticity.internal_forces import Elastic, Surroundings, resist, viscous_force
 from tissue.elasticity.neo_hookean import deform_solid, dilated_around, own_dilatation
@@ -47,6 +65,7 @@ from tissue.elasticity.relaxed_stress import (
 from tissue.elasticity.springs import spring_energy
 from tissue.elasticity.stress import MatrixRows, cofactors_of
 from tissue.laws.kernels import (
+    LawOfBlock,
     complementary_energy,
     stiffens,
     stretch_energy,
@@ -131,12 +150,13 @@ def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
     """Return the energy stored in the tetrahedra at `positions` [m], less that at rest [J]."""
     law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
     deform_solid(solid, body, positions)
-    energy = 0.0
+    # What is linear in J - 1 is that of tetrahedra where they have moduli of their own.
+    energy, a = 0.0, 1.0 if is_graded(solid) else law.a
     for block in range(blocks):
         energy += sum_of_lanes(_energies(solid, block))
     for node in range(body.n_nodes):
         v = solid.node_volume[node]
-        energy += v * _bulk_energy(law.lam_of_nodes, dilated_around(solid, node) / v, law.a)
+        energy += v * _bulk_energy(modulus_of_node(solid, node), dilated_around(solid, node) / v, a)
     if averages_shear(solid):
         energy += shear_energy_of_nodes(solid, body.n_nodes)
     if relaxes(solid):
@@ -165,23 +185,24 @@ def _relaxed_energies(solid: Solid, block: int) -> Lanes:
     """Return what relaxation adds to the energies of the tetrahedra of a block [J]."""
     width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
     v, gradient = shape_of(solid, block, VOLUME), known_gradient(solid, block)
-    rows = _Relaxed(solid.relaxed, solid.relaxed_terms, block, 1.0 - solid.law.shear_of_nodes)
-    total = _of_relaxed(solid, rows, gradient)
+    rows = _Relaxed(solid.relaxed, solid.relaxed_terms, block, own_share_of(solid, block, v))
+    total = _of_relaxed(solid, rows, law_of_block(solid, block, v), gradient)
     total = total - relaxed_pressure(solid, block) * own_dilatation(solid, block, v)
     for term in range(n_terms):
         at = width * (N_RELAXED * (n_terms * block + term) + PRESSURE)
         r = load_block(solid.relaxed_terms, at)
-        total = total + splat(_bulk_compliance(solid, term), v) * r * r
+        total = total + _bulk_compliance(solid, block, term, v) * r * r
     return v * total
 
 
 @inlined
 def _relaxed_energies_of_nodes(solid: Solid, block: int) -> Lanes:
     """Return what relaxation adds to the energies of the averaged shear of nodes [J]."""
-    first, share = width_of(solid.shape) * block, solid.law.shear_of_nodes
+    first = width_of(solid.shape) * block
     gradient, _, _ = averages_of(solid, first)
+    share = splat(solid.law.shear_of_nodes, gradient[0].x)
     rows = _Relaxed(solid.node_relaxed, solid.node_relaxed_terms, block, share)
-    w = _of_relaxed(solid, rows, gradient)
+    w = _of_relaxed(solid, rows, law_of_nodes(solid, first, share), gradient)
     return gathered_like(w, solid.node_volume, solid.every, first) * w
 
 
@@ -194,13 +215,20 @@ class _Relaxed(NamedTuple):
     """The same of each term."""
     block: int
     """The block."""
-    share: float
+    share: Lanes
     """The part of the shear that it is of; of that which is taken back it is an estimate."""
 
 
 @inlined
-def _of_relaxed(solid: Solid, relaxed: _Relaxed, gradient: MatrixRows) -> Lanes:
-    """Return what R adds to the energies of the shear [J/m3], from the rows of H."""
+def _of_relaxed(solid: Solid, relaxed: _Relaxed, of: LawOfBlock, gradient: MatrixRows) -> Lanes:
+    """Return what R adds to the energies of the shear [J/m3].
+
+    Args:
+        solid: Shares.
+        relaxed: R.
+        of: The law.
+        gradient: Rows of H.
+    """
     width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
     x, y, z = gradient
     rx, ry, rz = rows_of_stress(relaxed.sums, width * N_RELAXED * relaxed.block)
@@ -212,7 +240,8 @@ def _of_relaxed(solid: Solid, relaxed: _Relaxed, gradient: MatrixRows) -> Lanes:
     for term in range(n_terms):
         at = width * N_RELAXED * (n_terms * relaxed.block + term)
         rows = rows_of_stress(relaxed.terms, at)
-        total = total + _complementary(solid, term, rows, relaxed.share)
+        g = relaxed.share * splat(solid.relaxing_shares[term], strained)
+        total = total + _complementary(of, g, rows)
     return total
 
 
@@ -223,32 +252,40 @@ def _quadratic(h: Vec3, rx: Vec3, ry: Vec3, rz: Vec3) -> Lanes:
 
 
 @inlined
-def _complementary(solid: Solid, term: int, rows: MatrixRows, share: float) -> Lanes:
+def _complementary(of: LawOfBlock, g: Lanes, rows: MatrixRows) -> Lanes:
     """Return the complementary energy of R of a term [J/m3].
 
     Args:
-        solid: Moduli and shares.
-        term: The term.
+        of: The law.
+        g: Share of the term, of the part of the shear that R is of.
         rows: Rows of its R.
-        share: The part of the shear that R is of.
     """
-    law, g = solid.law, share * solid.relaxing_shares[term]
-    mu, (rx, ry, rz) = law.shear_modulus, rows
+    rx, ry, rz = rows
+    mu = of.mu if stiffens(of.law) else splat(0.75, rx.x) * of.mu
     trace = rx.x + ry.y + rz.z
     third = splat(1.0 / 3.0, trace)
     deviator = dot(rx, rx) + dot(ry, ry) + dot(rz, rz) - third * trace * trace
-    y = larger(splat(0.5 / (mu * g) ** 2, trace) * deviator, splat(0.0, trace))
-    return splat(0.5 * mu * g, trace) * complementary_energy(law, y)
+    of_term = larger(g * mu, splat(NO_MODULUS, trace))
+    y = larger(splat(0.5, trace) / (of_term * of_term) * deviator, splat(0.0, trace))
+    return splat(0.5, trace) * of_term * complementary_energy(of, y)
 
 
 @inlined
-def _bulk_compliance(solid: Solid, term: int) -> float:
-    """Return the complementary energy of r of a term over r^2 [1/Pa]."""
+def _bulk_compliance(solid: Solid, block: int, term: int, like: Lanes) -> Lanes:
+    """Return the complementary energies of r of a term over r^2 [1/Pa], of a block.
+
+    Args:
+        solid: Moduli and shares.
+        block: A block of tetrahedra.
+        term: The term.
+        like: A vector of the type of the numbers.
+    """
     law, g = solid.law, solid.relaxing_shares[term]
+    if is_graded(solid):
+        return splat(1.0 / g, like) * modulus_of(solid, block, BULK)
     modulus = law.lam_of_tetrahedra + law.lam_of_nodes
     bulk = modulus - law.excess + law.shear_modulus * 2.0 / 3.0
-    compliance: float = 0.5 * bulk / (g * modulus**2)
-    return compliance
+    return splat(0.5 * bulk / (g * modulus**2), like)
 
 
 @inlined
@@ -260,17 +297,24 @@ def _energies(solid: Solid, block: int) -> Lanes:
     law, width = solid.law, width_of(solid.shape)
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
+    of = law_of_block(solid, block, v)
     if stiffens(law):
-        shear = stretch_energy(law, stretch_invariant(x, y, z, *cofactors_of(x, y, z)))
+        shear = stretch_energy(of, stretch_invariant(x, y, z, *cofactors_of(x, y, z)))
     else:
         trace = x.x + y.y + z.z
         grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
         shear = grown - logarithm(splat(1.0, v) + splat(0.25, v) * grown)
     dilatation = load_block(solid.dilated, width * (1 + block))
     ratio = own_dilatation(solid, block, v)
+    own = splat(0.5, v) * own_share_of(solid, block, v) * of.mu
+    half = splat(0.5, v) * own_lam_of(solid, block, v)
+    if is_graded(solid):
+        bulk = half * dilatation * ratio
+        if not stiffens(law):  # lam (a - 1) of the whole lam is the shear modulus
+            bulk = bulk - shear_modulus_of(solid, block, v) * dilatation
+        return own * v * shear + bulk
     bulk = dilatation * (ratio + splat(2.0 * (1.0 - law.a), v))
-    own = splat(0.5 * law.mu * (1.0 - law.shear_of_nodes), v)
-    return own * v * shear + splat(0.5 * law.lam_of_tetrahedra, v) * bulk
+    return own * v * shear + half * bulk
 
 
 @kernel

@@ -18,26 +18,36 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, filled
+from tissue.core.simd import WIDTH
 from tissue.core.simd_blocks import width_of
 from tissue.core.simd_points import row_of_lane
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
-from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.laws.energy_density import EnergyDensity
 from tissue.mesh.body import Body
-from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
+from tissue.mesh.star import LARGEST_STAR
 
 N_RELAXED = 7
 """Numbers of the stress that has relaxed in a tetrahedron (`relaxed_stress`)."""
 
+(
+    MU,
+    OWN_LAM,
+    OWN_SHEAR,
+    EXPONENT,
+    YEOH_SECOND,
+    YEOH_THIRD,
+    BULK,
+    VISCOUS_MU,
+    VISCOUS_LAM,
+    N_MODULI,
+) = range(10)
+"""Places of the numbers of a tetrahedron in `Solid.moduli`, and how many these are."""
+
 VOLUME, N_SHAPE = 9, 10
 """Place of V among the quantities of `Solid.shape`, and how many these are. Before it are grad N_1,
 grad N_2 and grad N_3; grad N_0 is minus their sum."""
-
-STAR_POOL_MARGIN = LARGEST_STAR + WIDTH
-"""Free slots below which `build_stars` requests a larger pool; more than any one row needs."""
 
 LARGEST_RING = 3 * LARGEST_STAR + 1
 """Nodes of the tetrahedra around one node at most, itself among them."""
@@ -53,6 +63,32 @@ class Solid(Arrays, two_precisions=True):
     shape: FloatArray = sized((N_SHAPE, "in_blocks"), is_for_vectors=True)
     """grad N_1, grad N_2, grad N_3 [1/m] and V [m3] of each tetrahedron, in blocks of ten rows
     (`shape_place`). Its precision is that of all scratch but the node's own."""
+    moduli: FloatArray = sized((N_MODULI, "graded"), fill=1.0, is_for_vectors=True)
+    """Moduli and other numbers of the law of each tetrahedron, in blocks of nine rows
+    (`tissue.elasticity.graded`); empty where the whole body has the same."""
+    node_is_mixed: FloatArray = sized("graded_nodes")
+    """1 where labels meet, and nothing is averaged around the node; else 0. Shape (nodes,), as of
+    the moduli of nodes that follow, which are 0 there; empty where `moduli` is."""
+    node_modulus: FloatArray = sized("graded_nodes")
+    """`EnergyDensity.lam_of_nodes` of each node [Pa]."""
+    node_shear: FloatArray = sized("graded_nodes")
+    """`EnergyDensity.shear_modulus` [Pa]."""
+    node_mu: FloatArray = sized("graded_nodes")
+    """`EnergyDensity.mu` [Pa]."""
+    node_exponent: FloatArray = sized("graded_nodes", fill=1.0)
+    """`EnergyDensity.exponent`, which is never 0 under that law."""
+    node_second: FloatArray = sized("graded_nodes")
+    """`EnergyDensity.second`."""
+    node_third: FloatArray = sized("graded_nodes")
+    """`EnergyDensity.third`."""
+    node_excess: FloatArray = sized("graded_nodes")
+    """`EnergyDensity.excess` [Pa]."""
+    node_viscous_mu: FloatArray = sized("graded_nodes")
+    """Shear modulus of averaged rates, over the retardation time of the body [Pa]."""
+    node_viscous_lam: FloatArray = sized("graded_nodes")
+    """lam of averaged rates [Pa]."""
+    retardation_time: float
+    """Retardation time of the body, to which `moduli` refer [s]."""
     relaxing_shares: FloatArray
     """g of each term of the Prony series, shape (terms,); empty where no stress relaxes."""
     relaxation_times: FloatArray
@@ -189,6 +225,8 @@ def no_solid(
     *,
     prony: Sequence[tuple[float, float]] = (),
     is_single: bool = False,
+    is_graded: bool = False,
+    retardation_time: float = 0.0,
 ) -> Solid:
     """Return empty rows with room for that many nodes, tetrahedra and slots.
 
@@ -199,13 +237,16 @@ def no_solid(
         pool: Number of slots.
         prony: g and tau [s] of each term of the Prony series; none where no stress relaxes.
         is_single: Whether forces are computed in single precision.
+        is_graded: Whether tetrahedra have moduli of their own.
+        retardation_time: Of the body [s].
     """
     real = np.float32 if is_single else np.float64
     terms = np.array(prony, dtype=np.float64).reshape(-1, 2)
     return Solid.new(
-        _sizes(law, n_nodes, n_tetrahedra, pool, len(terms), is_single),
+        _sizes(law, n_nodes, n_tetrahedra, pool, len(terms), is_single, is_graded),
         real=real,
         law=law,
+        retardation_time=float(retardation_time),
         relaxing_shares=terms[:, 0].copy(),
         relaxation_times=terms[:, 1].copy(),
         every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH),
@@ -220,6 +261,7 @@ def _sizes(
     pool: int,
     n_terms: int,
     is_single: bool,
+    is_graded: bool,
 ) -> dict[str, int]:
     """Return the sizes of the arrays of `Solid` for that much."""
     width = 2 * WIDTH if is_single else WIDTH
@@ -228,6 +270,8 @@ def _sizes(
     averaging = n_nodes + 2 * WIDTH if averages else 0
     return {
         "nodes": n_nodes,
+        "graded": width * blocks if is_graded else 0,
+        "graded_nodes": n_nodes + 2 * WIDTH if is_graded else 0,
         "padded_nodes": n_nodes + 2 * WIDTH,
         "averaging_nodes": averaging,
         "averaging_relaxing": averaging if n_terms else 0,
@@ -248,14 +292,17 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     is_single = solid.shape.dtype == np.float32
     n_terms = len(solid.relaxation_times)
-    sizes = _sizes(solid.law, n_nodes, n_tetrahedra, pool, n_terms, is_single)
+    sizes = _sizes(
+        solid.law, n_nodes, n_tetrahedra, pool, n_terms, is_single, bool(is_graded(solid))
+    )
     larger = solid.grown(sizes)
     return larger.replaced(every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH))
 
 
-def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
-    """Return the slots that rows of that many nodes and tetrahedra take, twice over."""
-    return 2 * (4 * n_tetrahedra + WIDTH * n_nodes) + STAR_POOL_MARGIN
+def graded_solid(solid: Solid) -> Solid:
+    """Return the rows with room for moduli of each tetrahedron, with the same numbers."""
+    in_blocks, n_nodes = len(solid.shape) // N_SHAPE, len(solid.first)
+    return solid.grown({"graded": in_blocks, "graded_nodes": n_nodes + 2 * WIDTH})
 
 
 @kernel
@@ -287,6 +334,12 @@ def corner_row(solid: Solid, t: int, k: int) -> int:
     width = width_of(solid.shape)
     row: int = width * (4 * (1 + t // width) + k) + row_of_lane(t % width, width)
     return row
+
+
+@inlined
+def is_graded(solid: Solid) -> bool:
+    """Return whether tetrahedra have moduli of their own."""
+    return len(solid.node_is_mixed) > 0
 
 
 @inlined
@@ -338,63 +391,3 @@ def normals(body: Body, points: FloatArray, t: int) -> tuple[Vec3, Vec3, Vec3, f
     d3 = sub(vec3(points, body.tetrahedra[t, 3]), x0)
     n1 = cross(d2, d3)
     return n1, cross(d3, d1), cross(d1, d2), dot(d1, n1) / 6.0
-
-
-@kernel
-def build_stars(
-    solid: Solid, body: Body, visits: Visits, nodes: IntArray, n: int, around: IntArray
-) -> int:
-    """Write the rows of the first `n` of `nodes`; return how many were written.
-
-    If fewer than `n` were, the pool is full: enlarge it and continue from there.
-
-    Args:
-        solid: Rows are written; the shapes of the tetrahedra around the nodes are up to date.
-        body: The body.
-        visits: For searches.
-        nodes: The nodes.
-        n: How many of them.
-        around: Scratch, shape (LARGEST_STAR,).
-    """
-    for i in range(n):
-        if solid.used + STAR_POOL_MARGIN > len(solid.corner):
-            return i
-        _build_star(solid, body, visits, nodes[i], around)
-    return n
-
-
-@kernel
-def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: IntArray) -> None:
-    n = sorted_star(body, visits, node, around)
-    if n > solid.room[node]:
-        solid.first[node] = solid.used
-        solid.room[node] = filled(n)
-        solid.used += solid.room[node]
-    first = solid.first[node]
-    solid.count[node] = n
-    for slot in range(first + n, first + filled(n)):
-        solid.around[slot] = solid.corner[slot] = 0
-    volume = 0.0
-    for i in range(n):
-        t = around[i]
-        k = 0
-        while body.tetrahedra[t, k] != node:
-            k += 1
-        solid.around[first + i] = width_of(solid.shape) + t
-        solid.corner[first + i] = corner_row(solid, t, k)
-        volume += 0.25 * tetrahedron_volume(body.rest, body.tetrahedra, t)
-    solid.node_volume[node] = volume
-
-
-@kernel
-def tetrahedron_of_slot(solid: Solid, slot: int) -> int:
-    """Return the tetrahedron of a slot of a row."""
-    t: int = solid.around[slot] - width_of(solid.shape)
-    return t
-
-
-@kernel
-def corner_of_slot(solid: Solid, slot: int) -> int:
-    """Return which of the four corners of its tetrahedron a slot of a row is."""
-    corner: int = solid.corner[slot] // width_of(solid.shape) % 4
-    return corner

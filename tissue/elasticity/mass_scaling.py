@@ -18,7 +18,8 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, axpy, cross, vec3
-from tissue.elasticity.finite_elements import Solid, tetrahedron_of_slot
+from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.stars import tetrahedron_of_slot
 from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
 
@@ -78,7 +79,7 @@ def no_mass_scaling() -> MassScaling:
 
 
 @kernel
-def write_masses(body: Body, solid: Solid, nodes: IntArray, n: int, density: float) -> None:
+def write_masses(body: Body, solid: Solid, nodes: IntArray, n: int) -> None:
     """Write the masses of the first `n` of `nodes`, whose rows are up to date.
 
     Args:
@@ -86,13 +87,13 @@ def write_masses(body: Body, solid: Solid, nodes: IntArray, n: int, density: flo
         solid: The tetrahedra around them.
         nodes: The nodes.
         n: How many of them.
-        density: Density of the tissue [kg/m3].
     """
+    density, row = body.materials.density, body.material
     for i in range(n):
         node, mass = nodes[i], 0.0
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
             t = tetrahedron_of_slot(solid, slot)
-            mass += density * tetrahedron_volume(body.rest, body.tetrahedra, t) / 4.0
+            mass += density[row[t]] * tetrahedron_volume(body.rest, body.tetrahedra, t) / 4.0
         body.masses[node] = mass
         body.added_masses[node] = 0.0
 

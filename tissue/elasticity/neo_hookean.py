@@ -39,7 +39,14 @@ from tissue.elasticity.averaged_shear import (
     store_gradients,
     stress_of_nodes,
 )
-from tissue.elasticity.finite_elements import VOLUME, Solid, averages_shear, n_blocks
+from tissue.elasticity.finite_elements import (
+    VOLUME,
+    Solid,
+    averages_shear,
+    is_graded,
+    n_blocks,
+)
+from tissue.elasticity.graded import law_of_block, modulus_of_node, own_lam_of, own_share_of
 from tissue.elasticity.gradients import (
     displacements,
     gradient_of_displacement,
@@ -133,7 +140,7 @@ def _write_gradient(solid: Solid, block: int, has_stiffened: bool, is_averaged: 
         has_stiffened: Whether the law stiffens; a constant where this is called.
         is_averaged: Whether a share of the shear is averaged around nodes; a constant, too.
     """
-    law, width = solid.law, width_of(solid.shape)
+    width = width_of(solid.shape)
     x, y, z = gradient_of_displacement(solid, block)
     if keeps_gradients(solid):
         keep_gradient(solid, block, (x, y, z))
@@ -145,6 +152,7 @@ def _write_gradient(solid: Solid, block: int, has_stiffened: bool, is_averaged: 
     q = stretch_invariant(x, y, z, *cofactors)
     if is_averaged:
         store_gradients(solid, block, v, (x, y, z), dilated, q)
+    law = law_of_block(solid, block, q)
     if has_stiffened:
         factor = stiffening_factor(law, q)
     else:
@@ -168,7 +176,7 @@ def average_volumes(solid: Solid, begin: int, end: int) -> None:
 @inlined
 def _write_pressure(solid: Solid, node: int) -> None:
     grown = dilated_around(solid, node) / solid.node_volume[node]
-    store_everywhere(solid.pressure, node, solid.law.lam_of_nodes * grown)
+    store_everywhere(solid.pressure, node, modulus_of_node(solid, node) * grown)
 
 
 @kernel
@@ -213,15 +221,15 @@ def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool, is_averaged: 
     if has_relaxed:
         p = p - relaxed_pressure(solid, block)
     cofactors = cofactors_of(x, y, z)
-    factor = load_block(solid.stiffening, width * (1 + block))
+    factor, mu = load_block(solid.stiffening, width * (1 + block)), law_of_block(solid, block, v).mu
     if stiffens(law):
-        rest = splat(law.mu, v) * factor
+        rest = mu * factor
         s = splat(0.0, v)
     else:
         s = factor
-        rest = splat(0.75 * law.mu, v)
+        rest = splat(0.75, v) * mu
     if is_averaged:
-        own = splat(1.0 - law.shear_of_nodes, v)
+        own = own_share_of(solid, block, v)
         s, rest = own * s, own * rest + taken
     # The factors of H, K and 1, times -V:
     minus_v = splat(-1.0, v) * v
@@ -276,9 +284,8 @@ def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
 @inlined
 def with_own_pressure(solid: Solid, block: int, v: Lanes, p: Lanes) -> Lanes:
     """Return pressures with those that follow from J of each tetrahedron by itself [Pa]."""
-    law = solid.law
-    if law.lam_of_tetrahedra != 0.0:
-        p = p + splat(law.lam_of_tetrahedra, v) * own_dilatation(solid, block, v)
+    if is_graded(solid) or solid.law.lam_of_tetrahedra != 0.0:
+        p = p + own_lam_of(solid, block, v) * own_dilatation(solid, block, v)
     return p
 
 

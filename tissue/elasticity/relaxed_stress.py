@@ -20,13 +20,9 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import load_block, splat, width_of
 from tissue.core.vec3 import Vec3
-from tissue.elasticity.finite_elements import (
-    N_RELAXED,
-    VOLUME,
-    Solid,
-    shape_place,
-    tetrahedron_of_slot,
-)
+from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, is_graded, shape_place
+from tissue.elasticity.graded import own_share_of_one
+from tissue.elasticity.stars import tetrahedron_of_slot
 
 PRESSURE = 6
 """Place of r among the numbers of a tetrahedron. Before it are xx, yy, zz, yz, xz and xy of R."""
@@ -156,8 +152,13 @@ def inherit_at_nodes(solid: Solid, nodes: IntArray, n: int) -> None:
                 for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
                     t = tetrahedron_of_slot(solid, slot)
                     volume = 0.25 * solid.shape[shape_place(solid, t, VOLUME)]
+                    if is_graded(solid):
+                        own = own_share_of_one(solid, t)
+                        volume *= (1.0 - solid.law.shear_of_nodes) / own
                     value += volume * solid.relaxed_terms[relaxed_term_place(solid, t, term, which)]
                 value *= share / solid.node_volume[node]
+                if is_graded(solid) and solid.node_is_mixed[node] == 1.0:
+                    value = 0.0
                 solid.node_relaxed_terms[relaxed_term_place(solid, node, term, which)] = value
                 total += value
             solid.node_relaxed[relaxed_place(solid, node, which)] = total

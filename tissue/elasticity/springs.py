@@ -79,8 +79,6 @@ def build_rows(
     springs: Springs,
     nodes: IntArray,
     n: int,
-    density: float,
-    young_modulus: float,
     around: IntArray,
 ) -> int:
     """Write the rows and masses of the first `n` of `nodes`; return how many were written.
@@ -93,14 +91,12 @@ def build_rows(
         springs: Rows are written.
         nodes: The nodes.
         n: How many of them.
-        density: Density of the tissue [kg/m3].
-        young_modulus: Young's modulus in van Gelder's formula [Pa].
         around: Scratch, shape (LARGEST_STAR,).
     """
     for i in range(n):
         if springs.used + SPRING_POOL_MARGIN > len(springs.neighbour):
             return i
-        _build_row(body, visits, springs, nodes[i], density, young_modulus, around)
+        _build_row(body, visits, springs, nodes[i], around)
     return n
 
 
@@ -110,10 +106,10 @@ def _build_row(
     visits: Visits,
     springs: Springs,
     node: int,
-    density: float,
-    young_modulus: float,
     around: IntArray,
 ) -> None:
+    materials, row = body.materials, body.material
+    is_uniform = materials.is_even == 1
     # Both ends of an edge must add the same volumes in the same order, or the two ends of a spring
     # would differ in the last bit and action would not quite be reaction: hence sorted.
     n_around = sorted_star(body, visits, node, around)
@@ -139,20 +135,22 @@ def _build_row(
     for i in range(n_around):
         t = around[i]
         volume = tetrahedron_volume(body.rest, body.tetrahedra, t)
-        mass += density * volume / 4.0
+        mass += materials.density[row[t]] * volume / 4.0
+        share = volume if is_uniform else materials.spring_modulus[row[t]] * volume
         for k in range(4):
             other = body.tetrahedra[t, k]
             if other != node:
                 slot = first + visits.place[other]
                 springs.neighbour[slot] = other
-                springs.stiffness[slot] += volume
+                springs.stiffness[slot] += share
     springs.count[node] = n
     body.masses[node] = mass
     body.added_masses[node] = 0.0
     here = vec3(body.rest, node)
+    modulus = materials.spring_modulus[0] if is_uniform else 1.0
     for slot in range(first, first + n):
         length = norm(sub(vec3(body.rest, springs.neighbour[slot]), here))
-        k = young_modulus * springs.stiffness[slot] / (length * length)
+        k = modulus * springs.stiffness[slot] / (length * length)
         springs.stiffness[slot] = k
         springs.rest_pull[slot] = k * length
     for slot in range(first + n, first + filled(n)):

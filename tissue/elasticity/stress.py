@@ -4,8 +4,7 @@ from tissue.core.jit import inlined
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import splat
 from tissue.core.vec3 import Vec3, cross, dot
-from tissue.laws.energy_density import EnergyDensity
-from tissue.laws.kernels import stiffening_slope
+from tissue.laws.kernels import LawOfBlock, stiffening_slope
 
 MatrixRows = tuple[Vec3, Vec3, Vec3]
 """Rows of a matrix of each lane of a vector."""
@@ -69,7 +68,7 @@ def stress_of(
 
 @inlined
 def shear_stiffness(
-    law: EnergyDensity, q: Lanes, g: Lanes, gradient: MatrixRows, cofactors: MatrixRows
+    law: LawOfBlock, q: Lanes, g: Lanes, gradient: MatrixRows, cofactors: MatrixRows
 ) -> tuple[Lanes, Lanes]:
     """Return a bound on the stiffness of the shear over that at rest, and g' = w''(q).
 
@@ -77,7 +76,7 @@ def shear_stiffness(
     that of the energy is mu (g |dF|^2 + 2 g' ((F - cof F) : dF)^2).
 
     Args:
-        law: A law that stiffens.
+        law: A law that stiffens, of the block.
         q: Its argument (`tissue.laws.kernels`).
         g: w'(q).
         gradient: Rows of H.

@@ -33,11 +33,17 @@ from tissue.core.simd_rows import larger, where_larger
 from tissue.core.vec3 import Vec3, dot
 from tissue.elasticity.averaged_shear import averages_of, stress_of_nodes, taken_back
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages_shear
+from tissue.elasticity.graded import law_of_block, law_of_nodes, own_share_of, shear_of_nodes
 from tissue.elasticity.gradients import known_gradient, shape_of
 from tissue.elasticity.neo_hookean import own_dilatation, pressure_of, with_own_pressure
 from tissue.elasticity.stress import MatrixRows, cofactors_of
-from tissue.laws.energy_density import EnergyDensity
-from tissue.laws.kernels import isotropic_factor, stiffening_factor, stiffens, stretch_invariant
+from tissue.laws.kernels import (
+    LawOfBlock,
+    isotropic_factor,
+    stiffening_factor,
+    stiffens,
+    stretch_invariant,
+)
 
 SMALLEST_RATIO = 0.1
 """J below which S is that of a tetrahedron of this J, with less of it: S has the factor 1 / J, and
@@ -139,9 +145,9 @@ def _elastic_stress(solid: Solid, block: int) -> tuple[Vec3, Vec3, Lanes]:
     Without what of their shear is averaged around nodes.
     """
     v = shape_of(solid, block, VOLUME)
-    own = splat(1.0 - solid.law.shear_of_nodes, v)
+    own = own_share_of(solid, block, v)
     factor = load_block(solid.stiffening, width_of(solid.shape) * (1 + block))
-    c, s = _moduli(solid.law, factor)
+    c, s = _moduli(law_of_block(solid, block, v), factor)
     c, s = own * c, own * s
     if averages_shear(solid):
         _, p, taken = stress_of_nodes(solid, block, v)
@@ -160,28 +166,30 @@ def _elastic_stress_of_nodes(solid: Solid, block: int) -> tuple[Vec3, Vec3, Lane
     From the averages of F, less what tetrahedra take back.
     """
     law = solid.law
-    gradient, _, averaged_q = averages_of(solid, width_of(solid.shape) * block)
+    first = width_of(solid.shape) * block
+    gradient, _, averaged_q = averages_of(solid, first)
     x, y, z = gradient
     cx, cy, cz = cofactors_of(x, y, z)
     q = stretch_invariant(x, y, z, cx, cy, cz)
     trace = x.x + y.y + z.z
     stiff = stiffens(law)
-    factor = stiffening_factor(law, q) if stiff else isotropic_factor(law, trace, x, y, z)
-    c, s = _moduli(law, factor)
+    of = law_of_nodes(solid, first, q)
+    factor = stiffening_factor(of, q) if stiff else isotropic_factor(of, trace, x, y, z)
+    c, s = _moduli(of, factor)
     taken, _ = taken_back(averaged_q, q)
     share = splat(law.shear_of_nodes, q)
-    c, s = share * (c - splat(law.shear_modulus, q) * taken), share * s
+    c, s = share * (c - shear_of_nodes(solid, first, q) * taken), share * s
     dilatation = trace + (cx.x + cy.y + cz.z) + dot(x, cx)
     along, across = _shear_stress(c, s, gradient, dilatation)
     return along, across, splat(0.0, q)
 
 
 @inlined
-def _moduli(law: EnergyDensity, factor: Lanes) -> tuple[Lanes, Lanes]:
+def _moduli(of: LawOfBlock, factor: Lanes) -> tuple[Lanes, Lanes]:
     """Return c and s [Pa] of the shear part c (F - cof F) + s F from `Solid.stiffening`."""
-    if stiffens(law):
-        return splat(law.mu, factor) * factor, splat(0.0, factor)
-    return splat(0.75 * law.mu, factor), factor
+    if stiffens(of.law):
+        return of.mu * factor, splat(0.0, factor)
+    return splat(0.75, factor) * of.mu, factor
 
 
 @inlined

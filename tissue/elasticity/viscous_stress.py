@@ -32,8 +32,6 @@ Three loops, after the gradients of displacement: rates of blocks, averages of n
 blocks.
 """
 
-from typing import Final
-
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, point
@@ -44,7 +42,17 @@ from tissue.core.simd_rows import natural, where_larger
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, add, dot, scale, sub
-from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid, averages_shear, n_blocks
+from tissue.elasticity.finite_elements import (
+    N_SHAPE,
+    VISCOUS_LAM,
+    VISCOUS_MU,
+    VOLUME,
+    Solid,
+    averages_shear,
+    is_graded,
+    n_blocks,
+)
+from tissue.elasticity.graded import LEAST_LAM, modulus_of
 from tissue.elasticity.gradients import (
     displacements,
     gradient_of_displacement,
@@ -70,9 +78,6 @@ N_RATES = 15
 _RATE = 9
 """Place of J d among them, as xx, yy, zz, xy, yz and zx; before it are n_1, n_2 and n_3."""
 
-LEAST_LAM: Final = -2.0 / 3.0
-"""lam over mu at which the bulk modulus is 0."""
-
 
 class Viscosity(Arrays, two_precisions=True):
     """Scratch for rates of deformation; all of it is empty where tetrahedra have no viscosity."""
@@ -84,11 +89,13 @@ class Viscosity(Arrays, two_precisions=True):
     rate_rows: FloatArray = sized("averaged_behind_a_block", 16, is_for_vectors=True)
     """V J d of each tetrahedron [m3/s], behind a first block of zeros, where shear is averaged."""
     node_rates: FloatArray = sized("averaging_nodes", 16, is_for_vectors=True)
-    """J d averaged around each node [1/s]."""
+    """J d averaged around each node [1/s]; where tetrahedra have moduli of their own, times mu of
+    the node, and behind it lam J' [Pa/s]."""
     dilated: FloatArray = sized("behind_a_block", is_for_vectors=True)
     """V J' of each tetrahedron [m3/s], behind a first block of zeros, where it is not."""
     node_dilation: FloatArray = sized("dilating_nodes", 4, is_for_vectors=True)
-    """J' averaged around each node [1/s], four times in a row (`values_of_rows`)."""
+    """J' averaged around each node [1/s], four times in a row (`values_of_rows`); times the modulus
+    of the node where tetrahedra have moduli of their own [Pa/s]."""
     force: FloatArray = sized("forced_nodes", 3)
     """Viscous force on each node per tau [N/s], where it acts together with the elastic one."""
 
@@ -295,11 +302,25 @@ def average_rates(viscosity: Viscosity, solid: Solid, begin: int, end: int) -> N
             node = natural(i)
             share, first, n = 0.25 / solid.node_volume[node], solid.first[node], solid.count[node]
             store_sum_of_rows(viscosity.node_rates, node, share, rows, of, first, n)
+            if is_graded(solid):
+                _weigh_rates(viscosity, solid, node)
     else:
         for i in range(begin, end):
             node = natural(i)
             rate = 0.25 * sum_around(solid, viscosity.dilated, node) / solid.node_volume[node]
+            if is_graded(solid):
+                rate *= solid.node_viscous_lam[node]
             store_everywhere(viscosity.node_dilation, node, rate)
+
+
+@kernel
+def _weigh_rates(viscosity: Viscosity, solid: Solid, node: int) -> None:
+    """Multiply the averaged rates of a node by its moduli; those of its volume come behind them."""
+    rates, mu = viscosity.node_rates, solid.node_viscous_mu[node]
+    trace = rates[node, 0] + rates[node, 1] + rates[node, 2]
+    for q in range(6):
+        rates[node, q] *= mu
+    rates[node, 6] = solid.node_viscous_lam[node] * trace
 
 
 @kernel
@@ -335,13 +356,20 @@ def _viscous_forces_of(viscosity: Viscosity, solid: Solid, block: int, is_averag
     across = load_vector(viscosity.rates, at + (_RATE + 3) * width)
     own_mu, own_lam, mean_mu, mean_lam = viscous_moduli(solid.law)
     minus_v = splat(-1.0, v) * v
-    twice = splat(2.0 * own_mu, v)
-    p = splat(own_lam, v) * (along.x + along.y + along.z)
+    if is_graded(solid):
+        twice = splat(2.0, v) * modulus_of(solid, block, VISCOUS_MU)
+        lam = modulus_of(solid, block, VISCOUS_LAM)
+        mean_mu = mean_lam = 1.0  # those of nodes are in their rates
+    else:
+        twice, lam = splat(2.0 * own_mu, v), splat(own_lam, v)
+    p = lam * (along.x + along.y + along.z)
     along, across = scale(twice, along), scale(twice, across)
     if is_averaged:
         sums = sums_of_four_rows(viscosity.node_rates, solid.nodes, 4 * width * block)
-        xx, yy, zz, xy, yz, zx, _, _, _, _, _ = sums
-        p = p + splat(0.25 * mean_lam, v) * (xx + yy + zz)
+        xx, yy, zz, xy, yz, zx, trace, _, _, _, _ = sums
+        if not is_graded(solid):
+            trace = xx + yy + zz
+        p = p + splat(0.25 * mean_lam, v) * trace
         twice = splat(0.5 * mean_mu, v)
         along = add(along, scale(twice, Vec3(xx, yy, zz)))
         across = add(across, scale(twice, Vec3(xy, yz, zx)))

@@ -82,15 +82,12 @@ def _column(per: float, d1: Vec3, d2: Vec3, d3: Vec3, n1: float, n2: float, n3: 
 
 
 @kernel
-def stresses_of_tetrahedra(
-    elastic: Elastic, body: Body, spring_modulus: float, stresses: FloatArray
-) -> None:
+def stresses_of_tetrahedra(elastic: Elastic, body: Body, stresses: FloatArray) -> None:
     """Write the elastic Cauchy stress of each tetrahedron [Pa]; 0 of one that is inside out.
 
     Args:
         elastic: Scratch of its tetrahedra is written.
         body: The body.
-        spring_modulus: Young's modulus in van Gelder's formula [Pa], where there are springs.
         stresses: Written, zeros at first; shape (n_tetrahedra, 3, 3).
     """
     if elastic.has_tetrahedra:
@@ -103,7 +100,8 @@ def stresses_of_tetrahedra(
         if elastic.has_tetrahedra:
             _add_corners(elastic, body, t, per, stresses)
         if elastic.has_springs:
-            _add_edges(body, t, per * spring_modulus, stresses)
+            modulus = body.materials.spring_modulus[body.material[t]]
+            _add_edges(body, t, per * modulus, stresses)
 
 
 @kernel

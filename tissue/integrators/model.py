@@ -29,6 +29,7 @@ from tissue.integrators.stability import damping_rate, stable_step
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 from tissue.mesh.rigid_cores import RigidCores
 from tissue.mesh.star import LARGEST_STAR, mean_node_size, no_visits
@@ -60,7 +61,7 @@ class TissueModel:
 
     Args:
         body: Nodes and tetrahedra; masses are written.
-        material: What it is made of.
+        material: What it is made of; of several materials the one whose law they have.
         gravity: Acceleration of free fall [m/s2].
         blade: The body of the blade; None for a line that cuts.
         floor: Height of a floor below the body [m]; None for no floor.
@@ -80,7 +81,7 @@ class TissueModel:
         self.surroundings = Surroundings(
             gravity=gravity,
             drag=float(material.viscous_damping),
-            retardation_time=float(material.retardation_time),
+            retardation_time=float(body.materials.retardation_time.max()),
         )
         """Gravity and all damping."""
         self.visits = no_visits(body.n_nodes, body.n_tetrahedra)
@@ -97,6 +98,8 @@ class TissueModel:
         self.node_size = mean_node_size(body, self.visits, around)
         """Mean node size of the body before any cut [m]."""
         self.interaction = BladeInteraction(blade, material, self.node_size, body.n_tetrahedra)
+        if body.materials.n > 1:
+            self.interaction.take_materials(body.materials)
         self.contact = SelfContact(
             body,
             self.node_size,
@@ -109,7 +112,8 @@ class TissueModel:
         self.moves_together = numerics.moves_together
         """Whether all nodes are moved together."""
         self.stages = new_stages(len(body.rest))
-        self._set_damping(damps_between_steps=numerics.damps_between_steps)
+        self._damps_between_steps = numerics.damps_between_steps
+        self._set_damping()
         self.supports = supports_at_rest()
         """Whether fixed nodes move, and their work."""
         self.attachments = no_attachments()
@@ -132,8 +136,19 @@ class TissueModel:
         self._parts: tuple[Arrays, ...] = ()
         self.find_loose_pieces()
 
-    def _set_damping(self, *, damps_between_steps: bool) -> None:
+    def take_materials(self, materials: MaterialArrays) -> None:
+        """Make the body of other materials, of which each tetrahedron has a row already."""
+        self.body = self.body.replaced(materials=materials)
+        self.elasticity.take_materials(self.body, self.visits)
+        self.interaction.take_materials(materials)
+        self.contact.take_frequency(self.elasticity.frequency_squared)
+        longest = float(materials.retardation_time.max())
+        self.surroundings = self.surroundings.replaced(retardation_time=longest)
+        self._set_damping()
+
+    def _set_damping(self) -> None:
         """Divide damping into that in the stages of a step, and that between steps."""
+        damps_between_steps = self._damps_between_steps
         surroundings = self.surroundings
         undamped = surroundings.replaced(drag=0.0, retardation_time=0.0)
         between = surroundings if damps_between_steps else undamped

@@ -43,7 +43,7 @@ def write_vtu(
         deformation: Its stress and strain, which are cell data then, in single precision: `stress`
             [Pa] and `strain`, nine components row by row, and `von_mises` [Pa]. None: none is.
         labels: The label of each tetrahedron, shape (n_tets,), which is the cell data `label` then,
-            as `read_mesh` takes it. None: there is none.
+            as `read_mesh` takes it. None: those of the body, if any is not 0.
 
     Raises:
         MeshError: Positions or tetrahedra have another shape or hold no numbers; labels are no
@@ -51,6 +51,8 @@ def write_vtu(
         ValueError: Stress and strain are of other tetrahedra.
         OSError: The file cannot be written.
     """
+    if labels is None and snapshot.labels.any():
+        labels = snapshot.labels
     mesh = mesh_arrays(TetrahedralMesh(snapshot.positions, snapshot.tetrahedra, labels))
     snapshot = snapshot._replace(positions=mesh.positions, tetrahedra=mesh.tetrahedra)
     n_given = len(mesh.tetrahedra) if deformation is None else len(deformation.stress)

@@ -18,6 +18,7 @@ without any difference of large numbers. Under pure dilatation q is negative: th
 """
 
 import math
+from typing import NamedTuple
 
 from tissue.core.jit import inlined
 from tissue.core.simd import Lanes
@@ -46,6 +47,33 @@ _FACTORIALS = (362880.0, 40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0)
 3e-16."""
 
 
+class LawOfBlock(NamedTuple):
+    """The law of a block of tetrahedra, or of nodes: the constants of each."""
+
+    law: EnergyDensity
+    """A law of the same kind: that of the body."""
+    mu: Lanes
+    """`EnergyDensity.mu` [Pa]."""
+    exponent: Lanes
+    """`EnergyDensity.exponent`."""
+    second: Lanes
+    """`EnergyDensity.second`."""
+    third: Lanes
+    """`EnergyDensity.third`."""
+
+
+@inlined
+def same_law(law: EnergyDensity, like: Lanes) -> LawOfBlock:
+    """Return one law for all of a block; `like`: a vector of the type of its numbers."""
+    return LawOfBlock(
+        law,
+        splat(law.mu, like),
+        splat(law.exponent, like),
+        splat(law.second, like),
+        splat(law.third, like),
+    )
+
+
 @inlined
 def stiffens(law: EnergyDensity) -> bool:
     """Return whether the law is one of these."""
@@ -53,18 +81,18 @@ def stiffens(law: EnergyDensity) -> bool:
 
 
 @inlined
-def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
+def isotropic_factor(of: LawOfBlock, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
     """Return s of the neo-Hookean law [Pa] (`tissue.elasticity.neo_hookean`).
 
     Args:
-        law: The law.
+        of: The law of the block.
         trace: tr H.
         x: First row of H.
         y: Second row.
         z: Third row.
     """
     grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-    return splat(0.25 * law.mu, trace) * grown / (grown + splat(4.0, trace))
+    return splat(0.25, trace) * of.mu * grown / (grown + splat(4.0, trace))
 
 
 @inlined
@@ -85,50 +113,49 @@ def stretch_invariant(x: Vec3, y: Vec3, z: Vec3, cx: Vec3, cy: Vec3, cz: Vec3) -
 
 
 @inlined
-def stiffening_factor(law: EnergyDensity, q: Lanes) -> Lanes:
+def stiffening_factor(of: LawOfBlock, q: Lanes) -> Lanes:
     """Return g = w'(q), the shear modulus over that at rest."""
     one, positive = splat(1.0, q), larger(q, splat(0.0, q))
-    if law.exponent > 0.0:
-        return one + exponential_less_one(_exponent(law, positive))
-    second, third = splat(2.0 * law.second, q), splat(3.0 * law.third, q)
+    if of.law.exponent > 0.0:
+        return one + exponential_less_one(_exponent(of, positive))
+    second, third = splat(2.0, q) * of.second, splat(3.0, q) * of.third
     return one + positive * (second + third * positive)
 
 
 @inlined
-def stretch_energy(law: EnergyDensity, q: Lanes) -> Lanes:
+def stretch_energy(of: LawOfBlock, q: Lanes) -> Lanes:
     """Return w(q)."""
     positive = larger(q, splat(0.0, q))
-    if law.exponent > 0.0:
-        b = splat(law.exponent, q)
-        x = _exponent(law, positive)
+    if of.law.exponent > 0.0:
+        b = of.exponent
+        x = _exponent(of, positive)
         grown = exponential_less_one(x)
         # Beyond the largest exponent, and where q is negative, w continues along its tangent.
         return (grown + (grown + splat(1.0, q)) * (b * q - x)) / b
-    second, third = splat(law.second, q), splat(law.third, q)
-    return q + positive * positive * (second + third * positive)
+    return q + positive * positive * (of.second + of.third * positive)
 
 
 @inlined
-def complementary_energy(law: EnergyDensity, y: Lanes) -> Lanes:
+def complementary_energy(of: LawOfBlock, y: Lanes) -> Lanes:
     """Return 2 g q - w(q), with q from g^2 q = y.
 
     With y = |dev S|^2 / (2 mu^2), mu/2 times it is S : E - W at small strain: the energy that the
     stress S has by itself, |dev S|^2 / (4 mu) where nothing stiffens.
     """
-    if not stiffens(law):
+    if not stiffens(of.law):
         return y
-    q = _stretch_of_exponential(law, y) if law.exponent > 0.0 else _stretch_of_yeoh(law, y)
-    gq = stiffening_factor(law, q) * q
-    return gq + gq - stretch_energy(law, q)
+    q = _stretch_of_exponential(of, y) if of.law.exponent > 0.0 else _stretch_of_yeoh(of, y)
+    gq = stiffening_factor(of, q) * q
+    return gq + gq - stretch_energy(of, q)
 
 
 @inlined
-def _stretch_of_exponential(law: EnergyDensity, y: Lanes) -> Lanes:
+def _stretch_of_exponential(of: LawOfBlock, y: Lanes) -> Lanes:
     """Return q of exp(2 b q) q = y: in u = b q the root of 2 u + log u - log(b y), a concave one.
 
     From the left Newton's method stays there. Beyond `LARGEST_EXPONENT` g is constant.
     """
-    one, two, b = splat(1.0, y), splat(2.0, y), splat(law.exponent, y)
+    one, two, b = splat(1.0, y), splat(2.0, y), of.exponent
     by = b * (y + splat(_NO_STRESS, y))
     goal = logarithm(by)
     u = by / (one + two * by)
@@ -140,32 +167,32 @@ def _stretch_of_exponential(law: EnergyDensity, y: Lanes) -> Lanes:
 
 
 @inlined
-def _stretch_of_yeoh(law: EnergyDensity, y: Lanes) -> Lanes:
+def _stretch_of_yeoh(of: LawOfBlock, y: Lanes) -> Lanes:
     """Return q of g^2 q = y, which is convex: from the right Newton's method stays there."""
     q = y
     for _ in range(_NEWTON_STEPS_YEOH):
-        g = stiffening_factor(law, q)
-        slope = stiffening_slope(law, q, g)
+        g = stiffening_factor(of, q)
+        slope = stiffening_slope(of, q, g)
         q = q - (g * g * q - y) / (g * (g + (slope + slope) * q))
     return q
 
 
 @inlined
-def stiffening_slope(law: EnergyDensity, q: Lanes, g: Lanes) -> Lanes:
+def stiffening_slope(of: LawOfBlock, q: Lanes, g: Lanes) -> Lanes:
     """Return g' = w''(q), given g; 0 where q is negative or the law stiffens no more."""
     zero = splat(0.0, q)
-    if law.exponent > 0.0:
-        b = splat(law.exponent, q)
+    if of.law.exponent > 0.0:
+        b = of.exponent
         slope = where_larger(splat(LARGEST_EXPONENT, q), b * q, b * g, zero)
     else:
-        slope = splat(2.0 * law.second, q) + splat(6.0 * law.third, q) * q
+        slope = splat(2.0, q) * of.second + splat(6.0, q) * of.third * q
     return where_larger(q, zero, slope, zero)
 
 
 @inlined
-def _exponent(law: EnergyDensity, positive: Lanes) -> Lanes:
+def _exponent(of: LawOfBlock, positive: Lanes) -> Lanes:
     """Return b q, at most `LARGEST_EXPONENT`."""
-    x = splat(law.exponent, positive) * positive
+    x = of.exponent * positive
     over = larger(x - splat(LARGEST_EXPONENT, x), splat(0.0, x))
     return x - over
 

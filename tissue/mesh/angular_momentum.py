@@ -22,7 +22,8 @@ def note_spin(change: Change, volume: float, arm: Vec3, motion: Vec3) -> None:
 
     Args:
         change: Its `lost_spin` is written.
-        volume: Volume at rest whose fourth the corner carried; negative for a new corner [m3].
+        volume: Volume at rest whose fourth the corner carried, times `relative_density`; negative
+            for a new corner [m3].
         arm: From any point that is the same for all corners to the corner [m].
         motion: Velocity of the corner [m/s].
     """
@@ -33,16 +34,16 @@ def note_spin(change: Change, volume: float, arm: Vec3, motion: Vec3) -> None:
 
 
 @kernel
-def return_spin(body: Body, change: Change, density: float, nodes: IntArray, n: int) -> None:
+def return_spin(body: Body, change: Change, nodes: IntArray, n: int) -> None:
     """Turn the first `n` of `nodes` by what the last pass lost of angular momentum.
 
     Args:
         body: Velocities are written.
         change: What was lost, and is forgotten.
-        density: Density [kg/m3].
         nodes: The nodes of the changed tetrahedra, each once.
         n: How many these are.
     """
+    density = body.materials.density[0]
     lost = scale(density, Vec3(change.lost_spin[0], change.lost_spin[1], change.lost_spin[2]))
     _forget(change.lost_spin)
     if dot(lost, lost) == 0.0:

@@ -11,13 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.simd import room_for_points
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import Lattice, lattice_around
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
+from tissue.material import Material
+from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.nonconforming import HANGING, SMALL_FACES, Hanging, grown_hanging, nothing_hanging
 from tissue.types import TetrahedralMesh
 
@@ -66,6 +68,8 @@ class Body(Arrays):
     """Whether each tetrahedron is in a rigid core, shape (capacity,)."""
     n_rigid: IntCell
     """Number of tetrahedra in rigid cores."""
+    material: IntArray = sized("tetrahedra")
+    """Row of each tetrahedron in `materials`, shape (capacity,)."""
     n_nodes: IntCell
     """Number of nodes."""
     n_tetrahedra: IntCell
@@ -74,6 +78,8 @@ class Body(Arrays):
     """The lattice of exact decisions."""
     hanging: Hanging
     """Faces of two sizes that meet; empty unless the paper's scheme cuts."""
+    materials: MaterialArrays
+    """What tetrahedra are made of."""
 
 
 def build_links(tetrahedra: IntArray) -> IntArray:
@@ -99,9 +105,21 @@ def build_links(tetrahedra: IntArray) -> IntArray:
 
 
 def build_body(
-    mesh: TetrahedralMesh, positions: FloatArray | None, fixed: BoolArray | None
+    mesh: TetrahedralMesh,
+    positions: FloatArray | None,
+    fixed: BoolArray | None,
+    materials: MaterialArrays | None = None,
+    material: IntArray | None = None,
 ) -> Body:
-    """Return the body of a mesh, its nodes at `positions` [m] (default: at rest)."""
+    """Return the body of a mesh.
+
+    Args:
+        mesh: The mesh.
+        positions: Where its nodes are [m], shape (n_nodes, 3); None is at rest.
+        fixed: Which of them do not move, shape (n_nodes,); None is none.
+        materials: What it is made of; None is the usual material.
+        material: Row of each tetrahedron in that table, shape (n_tets,); None is the first.
+    """
     rest = np.ascontiguousarray(mesh.positions, dtype=np.float64)
     tetrahedra = np.ascontiguousarray(mesh.tetrahedra, dtype=np.int64)
     n = len(rest)
@@ -122,6 +140,8 @@ def build_body(
         n_tetrahedra=len(tetrahedra),
         lattice=lattice,
         hanging=nothing_hanging(),
+        material=np.zeros(len(tetrahedra), np.int64) if material is None else material.copy(),
+        materials=MaterialArrays.of([Material()], [0]) if materials is None else materials,
     )
 
 
@@ -141,6 +161,14 @@ def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
     hanging = grown_hanging(body.hanging, n_nodes, n_tetrahedra)
     larger = body.grown({"nodes": n_nodes, "tetrahedra": n_tetrahedra})
     return larger.replaced(hanging=hanging)
+
+
+@inlined
+def relative_density(body: Body, t: int) -> float:
+    """Return the density of a tetrahedron over that of the first material: exactly 1 of one."""
+    density = body.materials.density
+    relative: float = density[body.material[t]] / density[0]
+    return relative
 
 
 @kernel

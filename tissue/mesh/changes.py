@@ -56,8 +56,8 @@ class Change(Arrays):
     """LISTS or NODES where there was no room, and something is missing; else 0. What was done is of
     no use then: it is done again from where the step began, with more room."""
     lost_spin: FloatArray = sized(3)
-    """Angular momentum that the masses at nodes lost by splits, over the density [m5/s], shape
-    (3,)."""
+    """Angular momentum that the masses at nodes lost by splits, over the density of the first
+    material [m5/s], shape (3,)."""
     area: FloatCell
     """Area of the faces cut, at rest, one side of each, since the body was made [m2]."""
     finished_area: FloatCell

@@ -48,7 +48,7 @@ class Identity(NamedTuple):
         cls,
         body: Body,
         gravity: Vec3,
-        material: Material,
+        materials: Mapping[int, Material],
         blade: BladeShape | None,
         floor: float | None,
         solver: SolverSettings,
@@ -58,7 +58,7 @@ class Identity(NamedTuple):
         Args:
             body: The body.
             gravity: Acceleration of free fall [m/s2].
-            material: What it is made of.
+            materials: What it is made of, by label.
             blade: The body of the blade.
             floor: Height of the floor [m].
             solver: How it is cut and moved.
@@ -68,9 +68,12 @@ class Identity(NamedTuple):
         for array in (body.rest, body.positions, body.fixed):
             digest.update(array[:nodes].tobytes())
         digest.update(body.tetrahedra[:tetrahedra].tobytes())
+        digest.update(body.materials.label[body.material[:tetrahedra]].tobytes())
         parts = {"blade": blade, "solver": solver}
         settings = {"gravity": repr(tuple(gravity)), "floor": repr(floor)}
-        settings |= {f"material.{key}": repr(each) for key, each in material.as_keys().items()}
+        for label, material in materials.items():
+            name = "material" if len(materials) == 1 else f"material of label {label}"
+            settings |= {f"{name}.{key}": repr(each) for key, each in material.as_keys().items()}
         settings |= {name: value for part in parts.items() for name, value in _flat(*part)}
         for name in _FREE:
             del settings[name]

@@ -105,14 +105,14 @@ _OF_NODES = {
 """Arrays with a row for each node of the body."""
 
 _OF_TETRAHEDRA = {
-    "Body": ("tetrahedra", "links", "is_rigid"),
+    "Body": ("tetrahedra", "links", "is_rigid", "material"),
     "Collapsing": ("stiffness", "limit", "per_volume"),
     "CutSurface": ("tetrahedron_stamp", "tetrahedron_side"),
     "Faces": ("place", "piece"),
 }
 """Arrays with a row for each tetrahedron."""
 
-_IN_BLOCKS = {"nodes": 4, "shape": 10, "relaxed": 7, "gradient": 9}
+_IN_BLOCKS = {"nodes": 4, "shape": 10, "moduli": 9, "relaxed": 7, "gradient": 9}
 """Arrays of `Solid` in blocks of tetrahedra, and how many numbers each has there."""
 
 _BEHIND_A_BLOCK = (

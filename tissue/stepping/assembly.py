@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from tissue.blade.toughness import warn_of_toughness
 from tissue.blade_shape import BladeShape
+from tissue.body_materials import BodyMaterials
 from tissue.body_view import bounds_of_body
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.vec3 import Vec3
@@ -23,9 +24,8 @@ from tissue.integrators.methods import (
     method_of,
 )
 from tissue.integrators.model import Numerics, TissueModel
-from tissue.material import Material, warn_of_ratio
+from tissue.material import warn_of_ratio
 from tissue.mesh.body import build_body
-from tissue.mesh.validation import expect_sound
 from tissue.solver_settings import ELEMENTS, PRECISIONS, SolverSettings
 from tissue.stepping.energy_audit import Audit
 from tissue.stepping.stages import StepStages
@@ -37,7 +37,7 @@ def assembled(
     fixed: BoolArray | None,
     positions: FloatArray | None,
     gravity: Sequence[float],
-    material: Material,
+    materials: BodyMaterials,
     blade: BladeShape | None,
     floor: float | None,
     solver: SolverSettings,
@@ -45,11 +45,11 @@ def assembled(
     """Return the parts of a tissue.
 
     Args:
-        mesh: See `tissue.Tissue`, as for all arguments.
+        mesh: A sound mesh. See `tissue.Tissue`, as for all arguments.
         fixed: The supports, shape (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3).
         gravity: Acceleration of free fall [m/s2].
-        material: What the body is made of.
+        materials: What the body is made of.
         blade: The body of the blade.
         floor: Height of a floor below the body [m].
         solver: How the body is cut and moved.
@@ -57,11 +57,15 @@ def assembled(
     Raises:
         ValueError: an argument does not fit the mesh, or is not finite.
     """
-    mesh = expect_sound(mesh)
-    options = _checked_solver(solver, material)
+    material = materials.reference
+    options = _checked_solver(solver, materials)
     weight = _gravity(gravity)
     body = build_body(
-        mesh, _positions(positions, mesh.positions), _fixed(fixed, len(mesh.positions))
+        mesh,
+        _positions(positions, mesh.positions),
+        _fixed(fixed, len(mesh.positions)),
+        materials.table,
+        materials.rows,
     )
     if solver.scheme == "paper":
         from tissue.cutting.bielser_1998.mesh_records import with_room_to_hang
@@ -77,14 +81,16 @@ def assembled(
     )
     model = TissueModel(body, material, weight, blade, floor, numerics)
     node_size = model.node_size
-    warn_of_toughness(material, node_size)
-    warn_of_ratio(material)
+    different = tuple(dict.fromkeys((material, *materials.by_label.values())))
+    for each in different:
+        warn_of_toughness(each, node_size)
+        warn_of_ratio(each)
     _expect_floor(floor, float(bounds_of_body(body)[0, 2]), options)
-    scheme = scheme_of(solver.scheme, solver.cut, body, material.density, node_size)
+    scheme = scheme_of(solver.scheme, solver.cut, body, node_size)
     stepper = GlobalStepper(method, solver.threads)
     return StepStages(
         model,
-        material,
+        different,
         Incision(scheme, node_size),
         stepper,
         integrator_of(options, stepper, len(body.rest)),
@@ -167,8 +173,8 @@ def _expect_floor(floor: float | None, lowest: float, options: IntegratorOptions
         )
 
 
-def _checked_solver(solver: SolverSettings, material: Material) -> IntegratorOptions:
-    """Return the settings of the integrator that was chosen, for a body of that material.
+def _checked_solver(solver: SolverSettings, materials: BodyMaterials) -> IntegratorOptions:
+    """Return the settings of the integrator that was chosen, for a body of these materials.
 
     Raises:
         ValueError: there is no such scheme, integrator or number of threads, or the integrator does
@@ -176,7 +182,7 @@ def _checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpt
     """
     checked_scheme(solver.scheme)
     _checked_threads(solver.threads)
-    options = checked_relaxation(solver.relaxation, material)
+    options = checked_relaxation(solver.relaxation, materials.reference)
     if solver.audit and not isinstance(options, Global | Verlet):
         raise ValueError(
             "an audit needs relaxation='global' or 'verlet': in the others nodes are at different "

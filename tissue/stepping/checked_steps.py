@@ -59,7 +59,7 @@ class CheckedSteps:
         self._stages = stages
         self.n_repeated = 0
         """Number of steps that went wrong, and were done again in shorter ones."""
-        self.watch = StepWatch(stages.model, stages.material.wave_speed)
+        self.watch = StepWatch(stages.model, stages.model.body.materials.wave_speed)
         self.inputs: list[StepInputs] = []
         """What acted in each time step since a state was saved."""
         self._state: Memento | None = None

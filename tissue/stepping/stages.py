@@ -1,5 +1,6 @@
 """`StepStages`: the stages of a time step, in the order in which `advance` lists them."""
 
+from collections.abc import Sequence
 from operator import is_
 from time import perf_counter
 
@@ -56,7 +57,7 @@ class StepStages:
 
     Args:
         model: The body, and all that acts on it.
-        material: What it is made of.
+        materials: What it is made of, the stiffest first.
         incision: Brings the path of the blade into the mesh.
         global_stepper: Moves all nodes together, at least where the body settles.
         integrator: Moves the nodes in a step; it may be the same.
@@ -68,7 +69,7 @@ class StepStages:
     def __init__(
         self,
         model: TissueModel,
-        material: Material,
+        materials: Sequence[Material],
         incision: Incision,
         global_stepper: GlobalStepper,
         integrator: Integrator,
@@ -76,7 +77,7 @@ class StepStages:
         slit_reach: float,
     ) -> None:
         self.model = model
-        self.material = material
+        self.materials = materials
         self.incision = incision
         self.global_stepper = global_stepper
         self.integrator = integrator
@@ -330,13 +331,13 @@ class StepStages:
 
         `floor`: height of the floor below the body [m]; None for no floor.
         """
-        model, stepper = self.model, self.global_stepper
+        model = self.model
         self.handles.stop()
-        support = support_of(model, self.material, floor)
-        found = settle(stepper, model, NOWHERE, support)
+        support = support_of(model, self.materials[0], floor)
+        found = settle(self.global_stepper, model, NOWHERE, support)
         self.integrator.body_moved(model.body)
         if found.is_at_rest:
-            stepper.let_rest(model)
+            self.global_stepper.let_rest(model)
         else:
             warn_of_motion(model, found.n_steps, found.accelerations, support, SETTLED)
         write_bounds(model.body, self._bounds)
@@ -345,15 +346,14 @@ class StepStages:
 
     def take_edge(self, edge: Edge | None) -> None:
         """Take the edge of this blade; another blade, or none, releases the tissue."""
-        length = 0.0 if edge is None else edge.length
-        model = self.model
-        interaction = model.interaction
+        length, interaction = 0.0 if edge is None else edge.length, self.model.interaction
         if interaction.is_other_edge(length):
             if edge is not None:
                 interaction.expect_usable_edge(length)
-                expect_toughness_in_range(self.material, model.node_size)
+                for material in self.materials:
+                    expect_toughness_in_range(material, self.model.node_size)
             self.end_incision()
-            model.replace_edge(length)
+            self.model.replace_edge(length)
             self.incision.take_edge(interaction.n_samples)
 
     # changes of the mesh

@@ -99,7 +99,7 @@ def test_what_a_split_loses_of_angular_momentum_is_returned():
     springs_of(cut.body)
     assert not np.allclose(spin(), before, atol=1e-3 * DENSITY)
     every = np.arange(cut.body.n_nodes)
-    return_spin(cut.body, cut.change, DENSITY, every, len(every))
+    return_spin(cut.body, cut.change, every, len(every))
     np.testing.assert_allclose(spin(), before, atol=1e-12 * DENSITY)
 
 

@@ -42,7 +42,7 @@ def deflection(stiffness, unit, points, shares, axis):
 
 def of_tetrahedra(place, make, cells, material, axis):
     """Return the deflection of tetrahedra."""
-    unit, tetrahedra = make(cells, (1.0, 1.0, 1.0))
+    unit, tetrahedra = make(cells, (1.0, 1.0, 1.0))[:2]
     mesh = TetrahedralMesh(place(unit), tetrahedra)
     faces = np.concatenate([tetrahedra[:, s] for s in ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))])
     faces = faces[np.isclose(unit[faces, 0], 1.0).all(axis=1)]

@@ -13,6 +13,7 @@ from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 from tissue.integrators.methods import METHODS
 from tissue.integrators.stability import stable_step
 from tissue.mesh.body import build_body
+from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.star import no_visits
 
 MESH = bodies.jittered(2, seed=5)
@@ -91,7 +92,7 @@ def test_no_mode_grows_in_a_stable_step_with_any_damping(material, retardation_t
     root = 1.0 / np.sqrt(np.repeat(masses(MESH, material.density), 3))
     k, c = (root[:, None] * stiffness_matrix(MESH, m).toarray() * root for m in (material, viscous))
     c *= retardation_time
-    body = build_body(MESH, None, None)
+    body = build_body(MESH, None, None, MaterialArrays.of([material], [0]))
     elasticity = Elasticity(material, body, no_visits(len(body.rest), len(body.tetrahedra)))
     around = Surroundings(gravity=Vec3(0.0, 0.0, 0.0), drag=0.0, retardation_time=retardation_time)
     h = stable_step(method.number, elasticity.arrays, elasticity.frequency_squared, around)

@@ -10,18 +10,20 @@ from tests.tissue.solids import LAWS, built, law_of, moved, solid_of
 from tissue import block
 from tissue.core.simd import WIDTH
 from tissue.elasticity.finite_elements import (
-    STAR_POOL_MARGIN,
     VOLUME,
-    build_stars,
     build_tetrahedra,
-    corner_of_slot,
     grown_solid,
     no_solid,
-    room_for_stars,
     shape_place,
-    tetrahedron_of_slot,
 )
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
+from tissue.elasticity.stars import (
+    STAR_POOL_MARGIN,
+    build_stars,
+    corner_of_slot,
+    room_for_stars,
+    tetrahedron_of_slot,
+)
 from tissue.laws.energy_density import neo_hookean, volume_term
 from tissue.mesh.changes import clear_changes, touched_nodes
 from tissue.mesh.star import LARGEST_STAR, no_visits

@@ -79,11 +79,11 @@ def motion_of(gradient):
 
 def test_springs_and_masses_are_those_of_the_slow_reference():
     springs = edge_springs(MESH, 10e3)
-    slow = naive.stiffnesses(*MESH, 10e3)
+    slow = naive.stiffnesses(*MESH[:2], 10e3)
     fast = {(int(a), int(b)): k for (a, b), k in zip(*springs, strict=True)}
     assert fast.keys() == slow.keys()
     assert [fast[edge] for edge in slow] == pytest.approx(list(slow.values()), rel=1e-12)
-    np.testing.assert_allclose(masses(MESH, 1050.0), naive.masses(*MESH, 1050.0), rtol=1e-12)
+    np.testing.assert_allclose(masses(MESH, 1050.0), naive.masses(*MESH[:2], 1050.0), rtol=1e-12)
 
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)

@@ -122,7 +122,8 @@ def test_too_little_capacity_for_a_row_is_reported_and_nothing_is_lost():
     mesh = MESHES["grid"]
     body = build_body(mesh, None, None)
     n = len(mesh.positions)
-    arguments = (DENSITY, YOUNG_MODULUS, np.zeros(LARGEST_STAR, dtype=np.int64))
+    body.materials.spring_modulus[:] = YOUNG_MODULUS
+    arguments = (np.zeros(LARGEST_STAR, dtype=np.int64),)
     visits = no_visits(n, len(mesh.tetrahedra))
     too_small = no_springs(n, SPRING_POOL_MARGIN + 20)
     done = build_rows(body, visits, too_small, np.arange(n), n, *arguments)

@@ -5,8 +5,8 @@ import pytest
 
 from tests.support import bodies, strokes
 from tissue import BladeShape, Material, Tissue
-from tissue.elasticity.finite_elements import tetrahedron_of_slot
 from tissue.elasticity.frequency.changes import return_all_mass
+from tissue.elasticity.stars import tetrahedron_of_slot
 
 MESH = bodies.jittered(4, 2, size=0.04)
 LIVER = {"poisson_ratio": 0.45, "young_modulus": 3000.0, "toughness": 5.0}

@@ -294,7 +294,8 @@ def snapshot():
     velocities, masses = rng.normal(size=(n, 3)), rng.uniform(1e-6, 1e-3, n)
     fixed = side_nodes(BLOCK, ["left"])
     return Snapshot(
-        moved, BLOCK.positions, velocities, masses, 0.1 * masses, BLOCK.tetrahedra, fixed
+        *(moved, BLOCK.positions, velocities, masses, 0.1 * masses, BLOCK.tetrahedra, fixed),
+        np.zeros(len(BLOCK.tetrahedra), np.int64),
     )
 
 
@@ -321,6 +322,7 @@ def test_the_cell_data_has_the_piece_of_each_tetrahedron(tmp_path):
         np.zeros(n + 4),
         np.vstack([alone.tetrahedra, BLOCK.tetrahedra + 4]),
         np.zeros(n + 4, dtype=bool),
+        np.zeros(1 + len(BLOCK.tetrahedra), np.int64),
     )
     write_vtu(tmp_path / "body.vtu", body)
     (piece,) = meshio.read(tmp_path / "body.vtu").cell_data["piece"]

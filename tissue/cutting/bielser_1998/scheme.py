@@ -68,15 +68,13 @@ class PaperScheme(Scheme):
 
     Args:
         body: The body, uncut, with room for hanging nodes.
-        density: [kg/m3].
         node_size: Mean over the nodes of the smallest altitude around each [m].
     """
 
-    def __init__(self, body: Body, density: float, node_size: float) -> None:
+    def __init__(self, body: Body, node_size: float) -> None:
         # The cut surface stays empty: this scheme moves no node to it.
         limits = SnapLimits(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
         super().__init__(limits, len(body.rest), len(body.tetrahedra))
-        self._density = density
         self._reach = _REACH * node_size
         self._records = records_of(body)
         self._table = table()
@@ -128,7 +126,6 @@ class PaperScheme(Scheme):
             placing=self._placing,
             references=self._references,
             counts=self._counts,
-            density=self._density,
         )
 
 

@@ -26,7 +26,7 @@ from tissue.cutting.bielser_1998.template_1_to_17 import (
 from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
-from tissue.mesh.body import CUT, OUTER, Body
+from tissue.mesh.body import CUT, OUTER, Body, relative_density
 from tissue.mesh.changes import Change, note_child, note_dirty
 from tissue.mesh.nonconforming import HANGING, join_list, leave_list
 
@@ -58,8 +58,6 @@ class Split(Arrays):
     references: IntArray
     """Scratch: global node of each local node, for each part; shape (5, 14)."""
     counts: SplitCounts
-    density: float
-    """Density of the tissue [kg/m3]."""
 
 
 @kernel
@@ -78,11 +76,13 @@ def split_tetrahedron(s: Split, t: int, code: int) -> bool:
     refer_to_nodes(s, t, code)
     s.counts.n_of_case[s.table.case[code]] += 1
     volume = tetrahedron_volume(body.rest, body.tetrahedra, t)
+    density = body.materials.density[body.material[t]]
+    moving = relative_density(body, t) * volume
     for i in range(4):
         corner = records.tetrahedra[t, i]
         leave_list(body.hanging, corner, t)
-        body.masses[corner] -= 0.25 * s.density * volume
-        note_spin(s.change, volume, _arm(s, t, corner), vec3(body.velocities, corner))
+        body.masses[corner] -= 0.25 * density * volume
+        note_spin(s.change, moving, _arm(s, t, corner), vec3(body.velocities, corner))
     records.first_child[t] = body.n_tetrahedra
     body.n_tetrahedra += N_CHILDREN - 1
     for c in range(N_CHILDREN):
@@ -107,6 +107,7 @@ def _make_child(s: Split, t: int, c: int) -> None:
         _add_mass(s, t, table.children[c, k], body.tetrahedra[child, k], volume)
     note_dirty(s.change, child)
     if child != t:
+        body.material[child] = body.material[t]
         note_child(s.change, child, t)
 
 
@@ -117,10 +118,11 @@ def _add_mass(s: Split, t: int, local: int, node: int, volume: float) -> None:
     A node that a neighbour made earlier has moved by itself since: the collision is inelastic, and
     momentum is kept.
     """
-    body, mass = s.body, 0.25 * s.density * volume
+    body = s.body
+    mass = 0.25 * body.materials.density[body.material[t]] * volume
     total = body.masses[node] - body.added_masses[node] + mass
     velocity = vec3(body.velocities, node) if local < 4 else _velocity_within(s, t, local)
-    note_spin(s.change, -volume, _arm(s, t, node), velocity)
+    note_spin(s.change, -relative_density(body, t) * volume, _arm(s, t, node), velocity)
     if local >= 4 and not body.fixed[node]:
         before = vec3(body.velocities, node)
         store(body.velocities, node, axpy(mass / total, sub(velocity, before), before))

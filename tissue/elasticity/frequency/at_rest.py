@@ -26,14 +26,14 @@ from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.elasticity.finite_elements import (
     Solid,
     averages_shear,
-    corner_of_slot,
+    is_graded,
     node_place,
     normals,
     rest_normals,
-    tetrahedron_of_slot,
 )
+from tissue.elasticity.graded import modulus_of_node, own_moduli, shear_of_node
+from tissue.elasticity.stars import corner_of_slot, tetrahedron_of_slot
 from tissue.geometry.tetrahedron import add_square, largest_eigenvalue, nothing_symmetric
-from tissue.laws.energy_density import EnergyDensity
 from tissue.laws.kernels import stiffens
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -186,7 +186,7 @@ def dilatation_term(
     total = 0.0
     for i in range(n):
         total += solid.weight[solid.ring_nodes[i]] * norm(vec3(solid.ring, i))
-    term: float = solid.law.lam_of_nodes / solid.node_volume[node] * total
+    term: float = modulus_of_node(solid, node) / solid.node_volume[node] * total
     return term
 
 
@@ -268,6 +268,8 @@ def bounds_of_node(
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
         t, k = tetrahedron_of_slot(solid, slot), corner_of_slot(solid, slot)
+        if is_graded(solid):
+            mu, lam = own_moduli(solid, body, t)
         n1, n2, n3, volume = rest_normals(body, t)
         n0 = scale(-1.0, add(n1, add(n2, n3)))
         ratios = (
@@ -286,7 +288,7 @@ def bounds_of_node(
             if k == 0:
                 normal = scale(-1.0, add(n1, add(n2, n3)))
             if averages_shear(solid):
-                isotropic += law.shear_modulus * _share_taken(solid, t) * share * length
+                isotropic += _share_taken(solid, t) * share * length
         if has_stiffened:
             place = solid.around[slot]
             isotropic += float(solid.stiffening[place]) * mu * share * length
@@ -303,30 +305,46 @@ def bounds_of_node(
     mass = body.masses[node]
     if averages_shear(solid):
         isotropic += _averaged_shear(solid, n, has_stiffened) / weight
-    shear_of_lam = _lam_of_averaged_shear(law) / law.lam_of_nodes if averaged else 0.0
     for i in range(n):
-        normal = vec3(solid.ring, i)
+        normal, other = vec3(solid.ring, i), solid.ring_nodes[i]
         length = norm(normal)
         if length > 0.0:
-            c = (1.0 + shear_of_lam) * dilatation[solid.ring_nodes[i]] / (weight * length)
+            c = (1.0 + _lam_of_averaged_shear(solid, other)) * dilatation[other] / (weight * length)
             stiffness = add_square(stiffness, c, normal)
     return NodeBounds((isotropic + largest_eigenvalue(stiffness)) / mass, isotropic / mass)
 
 
 @inlined
 def _share_taken(solid: Solid, t: int) -> float:
-    """Return the stiffness of averaged shear that a tetrahedron takes back, over that at rest."""
+    """Return the stiffness of averaged shear that a tetrahedron takes back [Pa]."""
     total = 0.0
     for k in range(4):
-        total += float(solid.stiffness_taken[solid.nodes[node_place(solid, t, k)]])
-    return 0.25 * total * solid.law.shear_of_nodes
+        node = solid.nodes[node_place(solid, t, k)]
+        total += float(solid.stiffness_taken[node]) * _relative_shear(solid, node)
+    return solid.law.shear_modulus * (0.25 * total * solid.law.shear_of_nodes)
 
 
 @inlined
-def _lam_of_averaged_shear(law: EnergyDensity) -> float:
-    """Return mu and the part of lam of averaged shear [Pa], which is limited as in tetrahedra."""
-    mu = law.shear_modulus
-    return law.shear_of_nodes * (mu - min(law.excess, 2.0 / 3.0 * mu))
+def _relative_shear(solid: Solid, node: int) -> float:
+    """Return the shear modulus of the averages of a node over that of the law of the body."""
+    if not is_graded(solid):
+        return 1.0
+    return shear_of_node(solid, node) / solid.law.shear_modulus
+
+
+@inlined
+def _lam_of_averaged_shear(solid: Solid, node: int) -> float:
+    """Return mu and the part of lam of averaged shear of a node, over lam of its volume.
+
+    It is limited as in tetrahedra; 0 where nothing is averaged.
+    """
+    law, lam = solid.law, modulus_of_node(solid, node)
+    if law.shear_of_nodes == 0.0 or lam == 0.0:
+        return 0.0
+    mu, excess = shear_of_node(solid, node), law.excess
+    if is_graded(solid):
+        excess = solid.node_excess[node]
+    return law.shear_of_nodes * (mu - min(excess, 2.0 / 3.0 * mu)) / lam
 
 
 @inlined
@@ -345,6 +363,9 @@ def _averaged_shear(solid: Solid, n: int, has_stiffened: bool) -> float:
     for i in range(n):
         node = solid.ring_nodes[i]
         stiffness = float(solid.node_stiffness[node]) if has_stiffened else 1.0
+        if is_graded(solid):
+            lam = modulus_of_node(solid, node)
+            stiffness *= _relative_shear(solid, node) * law.lam_of_nodes / lam if lam > 0.0 else 0.0
         total += stiffness * solid.dilatation[node] * norm(vec3(solid.rest_ring, i))
     return total * law.shear_of_nodes * law.shear_modulus / law.lam_of_nodes
 

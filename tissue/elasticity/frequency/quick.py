@@ -18,7 +18,8 @@ from tissue.core.simd_blocks import gathered_like, load_block, splat, store_bloc
 from tissue.core.simd_rows import any_above, larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, dot
 from tissue.elasticity.averaged_shear import mean_of_nodes
-from tissue.elasticity.finite_elements import Solid, averages_shear, n_blocks
+from tissue.elasticity.finite_elements import Solid, averages_shear, is_graded, n_blocks
+from tissue.elasticity.graded import law_of_block, own_share_of
 from tissue.elasticity.gradients import gradient_of_displacement, gradient_of_shape, known_gradient
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.stress import (
@@ -226,7 +227,11 @@ def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, is_kno
         taken = mean_of_nodes(solid.stiffness_taken, solid, block, x.x)
         if stiffens(solid.law):
             of_averages = mean_of_nodes(solid.node_stiffness, solid, block, x.x)
-            taken = taken + (of_averages - stiffness)
+            if is_graded(solid):  # nodes that average nothing count as 0
+                own = own_share_of(solid, block, x.x)
+                stiffness = own * stiffness + of_nodes * of_averages
+            else:
+                taken = taken + (of_averages - stiffness)
         stiffness = stiffness + of_nodes * taken
     store_block(solid.stiffness, place, stiffness)
     return stiffness
@@ -237,11 +242,11 @@ def _stiffness_of_law(solid: Solid, block: int, gradient: MatrixRows, is_known: 
     """Return the stiffness under a law that stiffens; see `_write_stiffness`."""
     cofactors = cofactors_of(*gradient)
     q = stretch_invariant(*gradient, *cofactors)
-    place = width_of(solid.shape) * (1 + block)
+    of, place = law_of_block(solid, block, q), width_of(solid.shape) * (1 + block)
     if not is_known:
-        store_block(solid.stiffening, place, stiffening_factor(solid.law, q))
+        store_block(solid.stiffening, place, stiffening_factor(of, q))
     g = load_block(solid.stiffening, place)
-    stiffness, slope = shear_stiffness(solid.law, q, g, gradient, cofactors)
+    stiffness, slope = shear_stiffness(of, q, g, gradient, cofactors)
     store_block(solid.stiffening_slope, place, slope)
     return stiffness
 

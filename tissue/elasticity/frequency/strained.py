@@ -22,13 +22,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd_blocks import width_of
 from tissue.core.vec3 import dot, vec3
-from tissue.elasticity.finite_elements import (
-    Solid,
-    averages_shear,
-    n_blocks,
-    node_place,
-    tetrahedron_of_slot,
-)
+from tissue.elasticity.finite_elements import Solid, averages_shear, n_blocks, node_place
 from tissue.elasticity.frequency.at_rest import bounds_of_node, dilatation_term
 from tissue.elasticity.frequency.quick import (
     has_stiffness,
@@ -39,6 +33,7 @@ from tissue.elasticity.frequency.quick import (
 from tissue.elasticity.gradients import displacements
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import deform_solid
+from tissue.elasticity.stars import tetrahedron_of_slot
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 

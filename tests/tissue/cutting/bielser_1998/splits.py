@@ -53,4 +53,4 @@ def splits_of(mesh: TetrahedralMesh) -> Splits:
     corners = mesh.positions[mesh.tetrahedra]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
     np.add.at(body.masses, mesh.tetrahedra, 0.25 * DENSITY * volume[:, None])
-    return Splits(body, PaperScheme(body, DENSITY, 1.0))
+    return Splits(body, PaperScheme(body, 1.0))

@@ -1,0 +1,235 @@
+"""The materials of a body from those of its labels, checked, and their changes between episodes."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.material import Material
+from tissue.mesh.material_table import SCALED, MaterialArrays
+from tissue.types import TetrahedralMesh
+
+ALIKE = (
+    *("viscous_damping", "toughness_exponent", "toughness_speed", "prony"),
+    *("friction", "blade_friction", "blade_viscosity"),
+)
+"""Quantities that all materials of a body share: of the motion of the whole, or of the blade."""
+
+SPRINGS_ALIKE = ("retardation_time",)
+"""Quantities that they share, besides, where springs carry the shear: dampers have the stiffness of
+springs."""
+
+MOST_NAMED = 20
+"""Labels that an error names at most."""
+
+LabelKey = int | str | None
+"""A label by its number, or by its name in the file of the mesh; None: all that are not given."""
+
+
+class BodyMaterials(NamedTuple):
+    """What the tetrahedra of a body are made of."""
+
+    table: MaterialArrays
+    """The materials, each with its label."""
+    rows: IntArray
+    """Row of each tetrahedron, shape (n_tets,)."""
+    reference: Material
+    """One of them, for what all share: that which resists changes of volume most."""
+    by_label: Mapping[int, Material]
+    """The material of each label that is in the mesh, in order."""
+
+
+def materials_of(
+    mesh: TetrahedralMesh,
+    material: Material | Mapping[LabelKey, Material],
+    *,
+    averages_shear: bool,
+) -> BodyMaterials:
+    """Return what the tetrahedra of a mesh are made of.
+
+    Args:
+        mesh: The mesh, with the labels of its tetrahedra, if there are any.
+        material: One material, or one for each label.
+        averages_shear: Whether a share of the shear of tetrahedra is averaged around nodes.
+
+    Raises:
+        ValueError: there is no such label, one has no material, or materials differ in what they
+            must share.
+    """
+    n = len(mesh.tetrahedra)
+    labels = np.zeros(n, np.int64) if mesh.labels is None else mesh.labels
+    found, rows = np.unique(labels, return_inverse=True)
+    present = found.tolist()
+    used = _of_labels(present, mesh.label_names, material)
+    reference = max(used.values(), key=lambda each: (each.volume_modulus, each.young_modulus))
+    for label, each in used.items():
+        _expect_alike(described_label(mesh.label_names, label), each, reference)
+    table = MaterialArrays.of(list(used.values()), list(used), averages_shear=averages_shear)
+    return BodyMaterials(table, rows.reshape(n).astype(np.int64), reference, used)
+
+
+def _of_labels(
+    present: Sequence[int],
+    names: Mapping[int, str],
+    material: Material | Mapping[LabelKey, Material],
+) -> dict[int, Material]:
+    """Return the material of each label that is present.
+
+    Raises:
+        ValueError: there is no such label, or one has no material.
+    """
+    if isinstance(material, Material):
+        return dict.fromkeys(present, material)
+    given = {
+        number_of_label(present, names, label): each
+        for label, each in material.items()
+        if label is not None
+    }
+    rest = material.get(None)
+    lacking = [described_label(names, label) for label in present if label not in given]
+    if lacking and rest is None:
+        raise ValueError(
+            f"no material is given for label {', '.join(lacking[:MOST_NAMED])}; None: in place of "
+            "a label stands for all others"
+        )
+    return {label: given[label] if label in given else rest or Material() for label in present}
+
+
+def number_of_label(present: Sequence[int], names: Mapping[int, str], label: int | str) -> int:
+    """Return the number of a label.
+
+    Args:
+        present: The labels that there are.
+        names: Their names, of those that have one.
+        label: The label, by number or name.
+
+    Raises:
+        ValueError: no tetrahedron has it.
+    """
+    if isinstance(label, str):
+        numbers = [number for number, name in names.items() if name == label]
+    else:
+        numbers = [int(label)]
+    if len(numbers) == 1 and numbers[0] in present:
+        return numbers[0]
+    known = ", ".join(described_label(names, number) for number in present[:MOST_NAMED])
+    raise ValueError(
+        f"no tetrahedron has label {label!r}; there is {known}. Labels are those of the mesh: "
+        "`labels`, or groups and cell data of its file"
+    )
+
+
+def described_label(names: Mapping[int, str], label: int) -> str:
+    """Return a label with its name, if it has one."""
+    return f"{label} ('{names[label]}')" if label in names else f"{label}"
+
+
+def chosen(
+    table: MaterialArrays,
+    rows: IntArray,
+    names: Mapping[int, str],
+    where: int | str | npt.ArrayLike | None,
+) -> BoolArray:
+    """Return which tetrahedra a label or a mask chooses, shape (n_tets,).
+
+    Args:
+        table: The materials.
+        rows: Row of each tetrahedron, shape (n_tets,).
+        names: Names of labels.
+        where: A label, by number or name; a mask, shape (n_tets,); None for all.
+
+    Raises:
+        ValueError: no tetrahedron has the label or is in the mask, or it has another shape.
+    """
+    if where is None:
+        return np.ones(len(rows), dtype=np.bool_)
+    if isinstance(where, (int, np.integer, str)) and not isinstance(where, bool):
+        present = np.unique(table.label[rows]).tolist()
+        label = where if isinstance(where, str) else int(where)
+        return np.asarray(table.label[rows] == number_of_label(present, names, label))
+    mask = np.asarray(where)
+    if mask.shape != rows.shape or mask.dtype != np.bool_:
+        raise ValueError(
+            f"where has shape {mask.shape} and type {mask.dtype}; it is a label, or one truth "
+            f"value for each of the {len(rows)} tetrahedra"
+        )
+    if not mask.any():
+        raise ValueError("where is true for no tetrahedron")
+    return mask
+
+
+def _expect_alike(name: str, one: Material, other: Material) -> None:
+    """Refuse a material that differs in what all materials of a body share.
+
+    Raises:
+        ValueError: it does.
+    """
+    where = f"label {name}"
+    if type(one.law) is not type(other.law):
+        raise ValueError(
+            f"{where} has law {one.law.name} and the rest of the body {other.law.name}: one body "
+            "has one law. Moduli, and how much a law stiffens, may differ from label to label"
+        )
+    names = ALIKE + SPRINGS_ALIKE * one.law.has_springs
+    for quantity in names:
+        mine, theirs = getattr(one, quantity), getattr(other, quantity)
+        if mine != theirs:
+            raise ValueError(
+                f"{where} has {quantity} {mine} and the rest of the body {theirs}: it is "
+                "the same in all of a body"
+            )
+
+
+def scaled(
+    table: MaterialArrays, rows: IntArray, where: BoolArray, factors: Mapping[str, npt.ArrayLike]
+) -> tuple[MaterialArrays, IntArray]:
+    """Return the table, and the row of each tetrahedron, with quantities of some of them changed.
+
+    Args:
+        table: The materials.
+        rows: Row of each tetrahedron, shape (n_tets,).
+        where: The tetrahedra whose material changes, shape (n_tets,).
+        factors: Factors of quantities of `SCALED`: a number each, or one for each of the
+            tetrahedra, shape (`where.sum()`,).
+
+    Raises:
+        ValueError: there is no such quantity, or a factor is not finite and positive.
+    """
+    numbers = np.stack([*_checked_factors(factors, int(where.sum()))], axis=1)
+    pairs = np.concatenate([rows[where][:, None].astype(np.float64), numbers], axis=1)
+    kinds, place = np.unique(pairs, axis=0, return_inverse=True)
+    old = table.rows()
+    new = old[kinds[:, 0].astype(np.int64)].copy()
+    columns = ("label", *table.quantities())
+    for i, name in enumerate(factors):
+        for column in SCALED[name]:
+            new[:, columns.index(column)] *= kinds[:, 1 + i]
+    all_rows = rows.copy()
+    all_rows[where] = len(old) + place.reshape(-1)
+    kept, compact = np.unique(all_rows, return_inverse=True)
+    together, where_to = np.unique(np.concatenate([old, new])[kept], axis=0, return_inverse=True)
+    return MaterialArrays.of_rows(together), where_to.reshape(-1)[compact.reshape(-1)]
+
+
+def _checked_factors(factors: Mapping[str, npt.ArrayLike], n: int) -> Iterator[FloatArray]:
+    """Yield the factors of each quantity, shape (n,) each.
+
+    Raises:
+        ValueError: see `scaled`.
+    """
+    for name, factor in factors.items():
+        if name not in SCALED:
+            raise ValueError(
+                f"{name} is no quantity that a factor can change; these are {', '.join(SCALED)}"
+            )
+        array = np.asarray(factor, dtype=np.float64)
+        if array.shape not in ((), (n,)):
+            raise ValueError(
+                f"the factor of {name} has shape {array.shape}; it is a number, or one for each of "
+                f"the {n} tetrahedra"
+            )
+        if not (np.isfinite(array).all() and (array > 0.0).all()):
+            raise ValueError(f"the factor of {name} must be finite and positive, not {array}")
+        yield np.broadcast_to(array, (n,))

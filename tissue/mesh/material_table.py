@@ -1,0 +1,145 @@
+"""The materials that tetrahedra are made of: a table, of which each tetrahedron has a row.
+
+A uniform body has one row. Parts that a cut makes of a tetrahedron have its row, so that nothing
+else of a material has to be kept through cuts.
+"""
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.sized import sized
+from tissue.core.structs import Arrays, IntCell
+from tissue.laws.energy_density import EnergyDensity, averaged_shear
+from tissue.material import Material
+
+OF_LAW = ("mu", "lam_of_tetrahedra", "lam_of_nodes", "shear_modulus", "excess")
+"""Moduli of the energy density [Pa], all of which are in proportion to Young's modulus."""
+
+OF_STIFFENING = ("exponent", "second", "third")
+"""Numbers of laws that stiffen."""
+
+ELASTIC = ("young_modulus", "spring_modulus", "retardation_time", *OF_LAW, *OF_STIFFENING)
+"""Columns from which the forces inside the body follow."""
+
+SCALED: dict[str, tuple[str, ...]] = {
+    "young_modulus": ("young_modulus", "spring_modulus", *OF_LAW),
+    "density": ("density",),
+    "toughness": ("toughness", "skin_toughness", "work_to_rupture"),
+    "stiffening": OF_STIFFENING,
+    "retardation_time": ("retardation_time",),
+}
+"""Quantities that a factor can change, by the names of `Material`, and the columns of each."""
+
+
+class MaterialArrays(Arrays):
+    """A row for each material, shape (n_materials,) each."""
+
+    is_even: IntCell
+    """1 where forces inside the body are those of one material, else 0."""
+    label: IntArray = sized("materials")
+    """Label of the tetrahedra: which part of the body they are."""
+    young_modulus: FloatArray = sized("materials")
+    """Young's modulus [Pa]."""
+    poisson_ratio: FloatArray = sized("materials")
+    """Poisson's ratio."""
+    spring_modulus: FloatArray = sized("materials")
+    """Young's modulus in van Gelder's formula [Pa]."""
+    density: FloatArray = sized("materials")
+    """Density [kg/m3]."""
+    toughness: FloatArray = sized("materials")
+    """Energy per area of a slow cut by a sharp edge [J/m2]."""
+    skin_toughness: FloatArray = sized("materials")
+    """The same until the edge has broken the skin [J/m2]."""
+    work_to_rupture: FloatArray = sized("materials")
+    """Energy per volume of stretching to rupture [J/m3]."""
+    retardation_time: FloatArray = sized("materials")
+    """Viscosity over stiffness [s]."""
+    friction: FloatArray = sized("materials")
+    """Coefficient of friction between faces of the tissue, and on the floor."""
+    blade_friction: FloatArray = sized("materials")
+    """Coefficient of friction on the blade."""
+    blade_viscosity: FloatArray = sized("materials")
+    """Shear stress per sliding speed on the blade [Pa s/m]."""
+    mu: FloatArray = sized("materials")
+    """`EnergyDensity.mu` [Pa]; 0 where there is none, as of the columns that follow."""
+    lam_of_tetrahedra: FloatArray = sized("materials")
+    """`EnergyDensity.lam_of_tetrahedra` [Pa]."""
+    lam_of_nodes: FloatArray = sized("materials")
+    """`EnergyDensity.lam_of_nodes` [Pa]."""
+    shear_modulus: FloatArray = sized("materials")
+    """`EnergyDensity.shear_modulus` [Pa]."""
+    excess: FloatArray = sized("materials")
+    """`EnergyDensity.excess` [Pa]."""
+    exponent: FloatArray = sized("materials")
+    """`EnergyDensity.exponent`."""
+    second: FloatArray = sized("materials")
+    """`EnergyDensity.second`."""
+    third: FloatArray = sized("materials")
+    """`EnergyDensity.third`."""
+
+    @classmethod
+    def of(
+        cls,
+        materials: Sequence[Material],
+        labels: Sequence[int],
+        *,
+        averages_shear: bool = False,
+    ) -> Self:
+        """Return the table of these materials, each with its label.
+
+        Args:
+            materials: The materials.
+            labels: Their labels.
+            averages_shear: Whether a share of the shear of tetrahedra is averaged around nodes.
+        """
+        densities = [each.law.density(each.moduli) for each in materials]
+        if averages_shear:
+            # Springs carry all of the shear themselves.
+            densities = [
+                averaged_shear(each) if each is not None and each.mu > 0.0 else each
+                for each in densities
+            ]
+        columns = []
+        for name in cls.quantities():
+            if name in (*OF_LAW, *OF_STIFFENING):
+                columns.append([_of_density(density, name) for density in densities])
+            else:
+                columns.append([float(getattr(each, name)) for each in materials])
+        return cls.of_rows(np.array([labels, *columns], dtype=np.float64).T)
+
+    @classmethod
+    def quantities(cls) -> tuple[str, ...]:
+        """Return the names of all columns but the label."""
+        return tuple(name for name in cls.__annotations__ if name not in ("label", "is_even"))
+
+    @property
+    def n(self) -> int:
+        """Number of materials."""
+        return len(self.label)
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of the fastest waves of compression at small strain [m/s]."""
+        nu = self.poisson_ratio
+        ratio = (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        return float(np.sqrt(self.young_modulus * ratio / self.density).max())
+
+    def rows(self) -> FloatArray:
+        """Return the table as one array, the labels first, shape (n_materials, n_columns)."""
+        columns = [self.label.astype(np.float64), *(getattr(self, n) for n in self.quantities())]
+        return np.ascontiguousarray(np.stack(columns, axis=1))
+
+    @classmethod
+    def of_rows(cls, rows: FloatArray) -> Self:
+        """Return the table of which `rows` are the rows."""
+        label, *columns = (column.copy() for column in rows.T)
+        named = dict(zip(cls.quantities(), columns, strict=True))
+        is_even = all((named[name] == named[name][0]).all() for name in ELASTIC)
+        return cls(is_even=int(is_even), label=label.astype(np.int64), **named)
+
+
+def _of_density(density: EnergyDensity | None, name: str) -> float:
+    return 0.0 if density is None else float(getattr(density, name))
