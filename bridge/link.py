@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
 
 from bridge.driven import (
@@ -82,6 +82,10 @@ class TissueLink(Protocol):
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
+
+    @property
+    def label_names(self) -> Mapping[int, str]:
+        """Names of the labels of the body; none where it is in another process."""
 
     def step(
         self,
@@ -197,6 +201,11 @@ class InProcessLink:
     def tissue(self) -> Tissue:
         """The tissue itself."""
         return self._tissue
+
+    @property
+    def label_names(self) -> Mapping[int, str]:
+        """Names of the labels of the body."""
+        return self._tissue.label_names
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""

@@ -1,7 +1,7 @@
 """The client's end of the TCP link to a tissue in another process."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from bridge.driven import (
     NO_GEOMS,
@@ -106,6 +106,11 @@ class TcpLink:
     @while_waiting.setter
     def while_waiting(self, call: Callable[[], object]) -> None:
         self._connection.while_waiting = call
+
+    @property
+    def label_names(self) -> Mapping[int, str]:
+        """Names of the labels of the body: the server does not send them."""
+        return {}
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""

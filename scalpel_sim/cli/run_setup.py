@@ -58,6 +58,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "audit",
         "attachments",
         "cores",
+        "labels",
         "supports",
     }
 )

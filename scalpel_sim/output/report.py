@@ -32,6 +32,7 @@ _KPA_PER_PA = 1e-3
 CM3_PER_M3 = 1e6
 _MM_PER_M = 1e3
 _MM2_PER_M2 = 1e6
+_CM3_PER_M3 = 1e6
 _MJ_PER_J = 1e3
 
 
@@ -68,6 +69,8 @@ def print_summary(summary: Summary, console: Console) -> None:
         table.add_row(f"{stage}  {name}", f"{summary.share[stage]:.1%}")
     table.add_row("other (arm, bridge)", f"{summary.share['other']:.1%}")
     console.print(table)
+    if summary.labels:
+        console.print(_labels(summary))
     if summary.warnings:
         warnings = Table(title="warnings", title_justify="left", show_header=False, show_lines=True)
         warnings.add_column(style="bold", no_wrap=True)
@@ -76,6 +79,23 @@ def print_summary(summary: Summary, console: Console) -> None:
         console.print(warnings)
     if summary.energies_j is not None:
         console.print(_account(summary.energies_j, summary.residual_of_work))
+
+
+def _labels(summary: Summary) -> Table:
+    """Return the figures of the labelled parts of the body as a table."""
+    table = Table(title="parts of the body", title_justify="left")
+    table.add_column("label", style="bold")
+    for name in ("volume", "cut area", "pieces"):
+        table.add_column(name, justify="right")
+    for row in summary.labels:
+        name = row["name"] or (f"{row['label']}" if row["label"] else "the rest")
+        table.add_row(
+            f"{name} (to spare)" if row["spare"] else name,
+            f"{_CM3_PER_M3 * row['volume_m3']:,.3g} cm\u00b3",
+            f"{_MM2_PER_M2 * row['cut_area_m2']:,.1f} mm\u00b2",
+            f"{row['pieces']}",
+        )
+    return table
 
 
 def headline(summary: Summary) -> list[tuple[str, str]]:

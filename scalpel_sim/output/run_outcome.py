@@ -1,6 +1,6 @@
 """Request and outcome of a run: what its summary and its warnings are made from."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -76,6 +76,8 @@ class RunOutcome:
     """Ends of the strokes in turn, where a force or the body could end it."""
     held_points: Sequence[int] = ()
     """Number of points that each attachment holds at the end."""
+    label_names: Mapping[int, str] = field(default_factory=dict)
+    """Names of the labels of the body, as far as they are known."""
 
     @cached_property
     def pieces(self) -> tuple[Piece, ...] | None:
@@ -262,9 +264,16 @@ class RunOutcome:
         weight = self.tissue.material.density * volume * _downwards(settings["gravity"])
         return float(friction * max(weight + float(force[hardest, 2]), 0.0))
 
+    @property
+    def has_one_material(self) -> bool:
+        """Whether all of the body is of one material."""
+        return not any(row["material"] for row in self.settings.get("labels", ()))
+
     @cached_property
     def toughness(self) -> FloatArray | None:
         """Energy per area at the speed of the edge in each frame [J/m2]; None: not known."""
+        if not self.has_one_material:
+            return None
         law = toughness_law_of(self.tissue.material, self.tissue.blade)
         slow = np.full(len(self.recording), law.toughness)
         if law.exponent == 0.0:
@@ -323,6 +332,7 @@ def outcome_of(
         touched=simulation.touching.frames,
         stroke_ends=() if simulation.blade.progress is None else simulation.blade.progress.ends,
         held_points=[load.n_points for load in bridge.frame_loads],
+        label_names=simulation.link.label_names,
     )
 
 

@@ -18,6 +18,7 @@ from scalpel_sim.output.cut_account import (
     energy_released,
     length_of_cut,
 )
+from scalpel_sim.output.label_figures import label_figures
 from scalpel_sim.output.run_outcome import COMPLETE, RunOutcome
 
 LEAST_SHARE = 0.95
@@ -103,6 +104,17 @@ def _limited(outcome: RunOutcome) -> Iterator[RunWarning]:
         which = f"stroke {i + 1}" + (f", {kinds[i]}," if i < len(kinds) else "")
         stroke = {"stroke": i + 1, "ended": None if end is None else end.how}
         yield RunWarning(kind, f"{which} {problem}; {why}", stroke | figures)
+
+
+def _spared(outcome: RunOutcome) -> Iterator[RunWarning]:
+    """Warn of parts that were to be left whole, and were cut."""
+    for part in label_figures(outcome):
+        area = part["cut_area_m2"]
+        if part["spare"] and area > 0.0:
+            message = (
+                f"{part['name']} was to be left whole; {_MM2 * area:.2g} mm\u00b2 of it were cut"
+            )
+            yield RunWarning("spared", message, {"label": part["label"], "cut_area_m2": area})
 
 
 def _unfinished_cut(outcome: RunOutcome) -> Iterator[RunWarning]:
@@ -219,6 +231,7 @@ CHECKS: tuple[tuple[RunCheck, ...], ...] = (
     (_failed_grasp,),
     (_energy_released,),
     (_area_unpaid,),
+    (_spared,),
 )
 """The checks of a run. Of those in one group the first that finds something speaks for the others,
 which report the same."""

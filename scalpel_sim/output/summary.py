@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from scalpel_sim.output.label_figures import label_figures
 from scalpel_sim.output.run_outcome import RunOutcome
 from scalpel_sim.output.run_warnings import RunWarning
 from scalpel_sim.recording.columns import ACCOUNT
@@ -82,6 +83,9 @@ class Summary(NamedTuple):
     strokes: list[dict[str, Any]]
     """End of each stroke, and its time, where a force or the body could end it: `kind`, `ended`,
     `time_s`, `force_n`."""
+    labels: list[dict[str, Any]]
+    """Of each labelled part of the body: `label`, `name`, `spare`, `volume_m3`, `cut_area_m2`, and
+    in how many pieces it is. Empty without labels."""
     cores: list[dict[str, Any]]
     """Of each rigid core: how far it has moved and turned from the first frame to the last."""
     attachments: list[dict[str, Any]]
@@ -136,10 +140,11 @@ def summarise(outcome: RunOutcome, warnings: Iterable[RunWarning] = ()) -> Summa
         cut_area_m2=recording.at_end("cut_area_m2"),
         asked_area_m2=outcome.asked_area,
         finished_area_m2=recording.at_end("finished_area_m2"),
-        cut_area_paid_m2=_area_paid_for(energies, outcome.settings.get("material", {})),
+        cut_area_paid_m2=_area_paid_for(energies, outcome),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
         strokes=_strokes(outcome),
+        labels=label_figures(outcome),
         cores=_cores(outcome),
         attachments=_attachments(outcome),
         work_of_blade_j=work,
@@ -218,13 +223,15 @@ def _attachments(outcome: RunOutcome) -> list[dict[str, Any]]:
     return found
 
 
-def _area_paid_for(energies: dict[str, float] | None, material: dict[str, float]) -> float | None:
+def _area_paid_for(energies: dict[str, float] | None, outcome: RunOutcome) -> float | None:
     """Return the work of cutting over the toughness [m2]; None where there is no one toughness."""
+    material = outcome.settings.get("material", {}) if outcome.has_one_material else {}
     toughness = material.get("toughness", 0.0)
     others = ("skin_toughness", "toughness_exponent", "work_to_rupture")
     if energies is None or not toughness or any(material.get(name) for name in others):
         return None
-    return energies["cutting"] / toughness
+    area: float = energies["cutting"] / toughness
+    return area
 
 
 def _as_numbers(piece: Piece) -> dict[str, Any]:

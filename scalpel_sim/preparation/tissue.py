@@ -18,6 +18,7 @@ from tissue import (
     FloatArray,
     FramePath,
     Geom,
+    Material,
     SolverSettings,
     SupportPath,
     TetrahedralMesh,
@@ -66,7 +67,7 @@ def make_tissue(scene: Scene) -> Tissue:
     fixed = fixed_nodes(mesh, scene.body.fixed)
     tissue = Tissue(
         mesh,
-        scene.material,
+        scene.materials,
         fixed=fixed,
         positions=pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by),
         gravity=scene.world.free_fall,
@@ -83,7 +84,8 @@ def make_tissue(scene: Scene) -> Tissue:
             precision=solver.precision,
         ),
     )
-    expect_toughness_in_range(scene.material, tissue.node_size)  # a blade will come
+    for material in scene.all_materials:  # a blade will come
+        expect_toughness_in_range(material, tissue.node_size)
     table = tabletop_of(scene, tissue.bounds)
     if table is not None:
         tissue.collide_with([table.geom], [table.centre])
@@ -225,7 +227,7 @@ def check_scene(scene: Scene) -> None:
     for i, attachment in enumerate(scene.attachments):
         region = partial(fixed_nodes, mesh, attachment.where)
         naming_table(f"[[attachment]] number {i + 1}", region)
-    drag = highest_toughness(scene) / scene.material.young_modulus
+    drag = max(_toughness_in(scene, each) / each.young_modulus for each in scene.all_materials)
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
     if drag > LONG_DRAG * extent and not scene.material.stiffens:
         _log.warning(
@@ -239,7 +241,11 @@ def check_scene(scene: Scene) -> None:
 
 def highest_toughness(scene: Scene) -> float:
     """Return the highest toughness in a scene [J/m2]: of the skin, or at the stroke's speed."""
-    material = scene.material
+    return max(_toughness_in(scene, material) for material in scene.all_materials)
+
+
+def _toughness_in(scene: Scene, material: Material) -> float:
+    """Return the highest toughness of a material in a scene [J/m2]."""
     resistance = toughness_law_of(material, scene.blade)
     at_speed = resistance.toughness
     if material.toughness_exponent > 0.0:

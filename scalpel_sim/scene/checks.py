@@ -16,6 +16,7 @@ from scalpel_sim.scene.schema import (
     ArmTable,
     AttachmentTable,
     GrasperTable,
+    LabelTable,
     LedSupportTable,
     SolverTable,
     ViewTable,
@@ -177,6 +178,20 @@ def check_support(table: LedSupportTable, where: str) -> None:
             raise UsageError(f"{where} has {len(table.times)} times and {len(rows)} rows of a key")
     if table.times[0] <= 0.0 or any(b <= a for a, b in pairwise(table.times)):
         raise UsageError(f"{where} has the times {table.times}; they begin above 0 and increase")
+
+
+def check_label(table: LabelTable, where: str) -> None:
+    """Check that the keys of a label make sense together: see `check_rows`."""
+    if table.label is not None and table.region is not None:
+        raise UsageError(
+            f"{where} has label and region; one says which elements it is: label, a number of the "
+            "mesh file, or region, a box or a sphere"
+        )
+    if table.region is not None and ":" not in table.region:
+        raise UsageError(
+            f"{where} has region '{table.region}'; it is a box (\"0,0,0:0.01,0.02,0.03\") or a "
+            'sphere ("sphere:0.01,0.02,0.03,0.005")'
+        )
 
 
 def check_attachment(table: AttachmentTable, where: str) -> None:

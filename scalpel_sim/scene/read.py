@@ -33,6 +33,8 @@ SHIPPED_SCENES = (
     "retract",
     "excise",
     "taut_incision",
+    "layers",
+    "tumour",
     "liver",
     "kidney",
     "skin",

@@ -17,6 +17,7 @@ from scalpel_sim.scene.checks import (
     check_arm,
     check_attachment,
     check_grasper,
+    check_label,
     check_range,
     check_rows,
     check_solver,
@@ -24,12 +25,14 @@ from scalpel_sim.scene.checks import (
     check_view,
     virtual_coupling,
 )
+from scalpel_sim.scene.labels import labelled
 from scalpel_sim.scene.schema import (
     ArmTable,
     AttachmentTable,
     BladeTable,
     CoreTable,
     GrasperTable,
+    LabelTable,
     LedSupportTable,
     PresetMaterialTable,
     SolverTable,
@@ -71,6 +74,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """The geometry, and how it is held."""
     material_table: PresetMaterialTable | None = field(default=None, name="material")
     """The material; a soft gel without."""
+    labels: tuple[LabelTable, ...] = field(default=(), name="label")
+    """Parts of the body, each with a name, and with a material of its own."""
     blade_table: BladeTable = field(default_factory=BladeTable, name="blade")
     """The blade; a scalpel without."""
     world: WorldTable = field(default_factory=WorldTable)
@@ -101,6 +106,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         _ = self.cut, self.blade  # they check themselves
         check_range(self.body.stretched_by, self.world.free_fall, self.seconds)
         check_arm(self.arm, self.world)
+        _ = self.materials
+        check_rows("label", self.labels, check_label)
         check_rows("attachment", self.attachments, check_attachment)
         check_rows("support", self.supports, check_support)
         check_rows("grasper", self.graspers, check_grasper)
@@ -113,6 +120,32 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         if table is None:
             return GEL
         return naming_table("[material]", lambda: material_of(table))
+
+    @cached_property
+    def materials(self) -> Material | dict[int | str | None, Material]:
+        """Material of the body; or, where labels have their own, of each and of the rest (None)."""
+        own: dict[int | str | None, Material] = {
+            row.name: self._material_of_label(row) for row in self.labels if row.material
+        }
+        return {None: self.material, **own} if own else self.material
+
+    @property
+    def all_materials(self) -> tuple[Material, ...]:
+        """Each material of the body once."""
+        materials = self.materials
+        found = (materials,) if isinstance(materials, Material) else materials.values()
+        return tuple(dict.fromkeys(found))
+
+    def _material_of_label(self, row: LabelTable) -> Material:
+        table = row.material
+        assert table is not None
+
+        def made() -> Material:
+            if table.preset is not None:
+                return material_of(table)
+            return self.material.changed(**given_in(table))
+
+        return naming_table(f"[[label]] '{row.name}'", made)
 
     @cached_property
     def blade(self) -> BladeShape | None:
@@ -134,7 +167,11 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             MeshError: it cannot be cut.
             ValueError: there can be no such body.
         """
-        return self.body.mesh()
+        return self._labelled_mesh
+
+    @cached_property
+    def _labelled_mesh(self) -> TetrahedralMesh:
+        return labelled(self.body.mesh(), self.labels)
 
     @property
     def stroke(self) -> str:
@@ -164,6 +201,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         return {
             "about": self.about,
             "material": self.material.as_keys(),
+            "labels": [self._settings_of_label(row) for row in self.labels],
             "fixed": self.body.fixed,
             "cut": asdict(self.cut),
             **_values(
@@ -186,6 +224,11 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "seconds": self.seconds,
             "stroke": self.stroke,
         }
+
+    def _settings_of_label(self, row: LabelTable) -> dict[str, Any]:
+        """Return what a report has of a label: its material as numbers, where it has its own."""
+        material = None if row.material is None else self._material_of_label(row).as_keys()
+        return {"name": row.name, "spare": row.spare, "material": material}
 
 
 def _values(table: TomlTable, *keys: str) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from scalpel_sim.tables.values import (
     FourNumbers,
     Gravity,
     Label,
+    LabelNumber,
     LawName,
     Name,
     NotNegative,
@@ -111,6 +112,22 @@ class PresetMaterialTable(MaterialTable, kw_only=True, frozen=True):
     preset: Text | None = None
     """Name of a material (`scalpel-sim materials`). Without a preset, `law` and `young_modulus` are
     needed."""
+
+
+class LabelTable(TomlTable, kw_only=True, frozen=True):
+    """`[[label]]`: a part of the body, with a name, and a material of its own."""
+
+    name: Label
+    """Name of the part. Without `label` and `region` it is that of a group of the mesh file."""
+    label: LabelNumber | None = None
+    """Number of the part in the mesh file."""
+    region: Region | None = None
+    """Box or sphere, as for `fixed`: the elements whose middles are in it."""
+    material: PresetMaterialTable | None = None
+    """Material: a preset, with figures that replace its own; or figures that replace those of
+    `[material]`."""
+    spare: TrueOrFalse = False
+    """Whether the blade is to leave it whole: a run that cuts it says so."""
 
 
 class BladeTable(TomlTable, kw_only=True, frozen=True):

@@ -108,6 +108,7 @@ SNAPSHOT: Message[Snapshot] = Message(
         added_masses=("nodes",),
         tetrahedra=("tetrahedra", 4),
         fixed=("nodes",),
+        labels=("tetrahedra",),
     ),
     "the snapshot",
     _check_snapshot,

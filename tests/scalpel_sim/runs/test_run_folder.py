@@ -38,7 +38,15 @@ def body():
     tetrahedra = np.array([[3, 0, 1, 2], [7, 4, 5, 6]])
     is_held = np.arange(8) == 4
     masses = np.ones(8), np.zeros(8)
-    return Snapshot(corners, corners.copy(), np.zeros((8, 3)), *masses, tetrahedra, is_held)
+    return Snapshot(
+        corners,
+        corners.copy(),
+        np.zeros((8, 3)),
+        *masses,
+        tetrahedra,
+        is_held,
+        np.zeros(2, np.int64),
+    )
 
 
 @pytest.fixture(scope="module")

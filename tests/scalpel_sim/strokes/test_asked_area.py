@@ -29,7 +29,8 @@ def lying(mesh, positions=None):
     n = len(mesh.positions)
     positions = mesh.positions if positions is None else positions
     nothing = np.zeros((n, 3)), np.ones(n), np.zeros(n)
-    return Snapshot(positions, mesh.positions, *nothing, mesh.tetrahedra, np.zeros(n, bool))
+    labels = 0 * mesh.tetrahedra[:, 0]
+    return Snapshot(positions, mesh.positions, *nothing, mesh.tetrahedra, np.zeros(n, bool), labels)
 
 
 def planned(name, body, **settings):

@@ -73,7 +73,9 @@ def test_material_is_found_where_it_is_at_rest_in_a_body_that_is_sheared():
     still, light = np.zeros_like(rest), np.ones(len(rest))
     own, added, free = light, 0.0 * light, light > 2
     moved = rest + 0.3 * rest[:, [2, 0, 1]]
-    body = Snapshot(moved, rest, still, own, added, mesh.tetrahedra, free)
+    body = Snapshot(
+        moved, rest, still, own, added, mesh.tetrahedra, free, 0 * mesh.tetrahedra[:, 0]
+    )
     points = np.random.default_rng(0).uniform(0.1, 0.9, (20, 3))
     moved = points + 0.3 * points[:, [2, 0, 1]]
     np.testing.assert_allclose(rest_of(moved, body), points, atol=1e-12)

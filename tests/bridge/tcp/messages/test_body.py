@@ -28,6 +28,7 @@ TETRAHEDRON = Snapshot(
     added_masses=np.array([0.1, 0.0, 0.0, 0.0]),
     tetrahedra=np.array([[0, 1, 2, 3]]),
     fixed=np.array([True, False, False, True]),
+    labels=np.array([2]),
 )
 SKIN = Surface(
     positions=TETRAHEDRON.positions,

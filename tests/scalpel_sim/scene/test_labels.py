@@ -1,0 +1,103 @@
+"""Labels of a scene: parts of the body by region, number or name, and their figures."""
+
+import json
+
+import numpy as np
+import pytest
+
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE, UsageError
+from scalpel_sim.scene.labels import labelled
+from scalpel_sim.scene.schema import LabelTable
+from tissue import block
+
+MESH = block((4, 4, 4), (0.04, 0.04, 0.04))
+LOW, HIGH = "0,0,0:0.04,0.04,0.02", "0,0,0.02:0.04,0.04,0.04"
+
+
+def test_regions_name_tetrahedra_by_their_middles_and_the_last_one_counts():
+    rows = [
+        LabelTable(name="low", region=LOW),
+        LabelTable(name="lump", region="sphere:0.02,0.02,0.01,0.008"),
+    ]
+    mesh = labelled(MESH, rows)
+    middles = MESH.positions[MESH.tetrahedra].mean(axis=1)
+    lump = np.linalg.norm(middles - [0.02, 0.02, 0.01], axis=1) <= 0.008
+    assert mesh.label_names == {1: "low", 2: "lump"}
+    np.testing.assert_array_equal(mesh.labels == 2, lump)
+    np.testing.assert_array_equal(mesh.labels == 1, (middles[:, 2] < 0.02) & ~lump)
+
+
+def test_a_label_of_the_mesh_is_meant_by_number_or_by_name():
+    given = MESH._replace(labels=np.arange(len(MESH.tetrahedra)) % 2, label_names={1: "fat"})
+    assert labelled(given, [LabelTable(name="fat")]).label_names == {1: "fat"}
+    named = labelled(given, [LabelTable(name="skin", label=0)])
+    assert named.label_names == {0: "skin", 1: "fat"}
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([LabelTable(name="fat")], "the mesh has no label 'fat'; it has none"),
+        ([LabelTable(name="fat", label=3)], "the mesh has no label 3; it has none"),
+        ([LabelTable(name="fat", region="1,1,1:2,2,2")], "no tetrahedron has its middle in region"),
+        ([LabelTable(name="a", region=LOW), LabelTable(name="a", region=HIGH)], "occurs twice"),
+        ([LabelTable(name="a", region=LOW), LabelTable(name="b", region=LOW)], "hold all of it"),
+    ],
+)
+def test_labels_that_cannot_be_are_refused_by_name(rows, message):
+    with pytest.raises(UsageError, match=message):
+        labelled(MESH, rows)
+
+
+def test_the_force_of_layers_is_the_toughness_of_each(tmp_path):
+    """A strip 4 mm thick of skin, fat and muscle (1,136, 200 and 550 J/m2) is cut in two."""
+    command = ["run", "layers", "--quiet", "--out", str(tmp_path)]
+    assert command_line(command) == EXIT_OK
+    force = np.genfromtxt(tmp_path / "forces.csv", delimiter=",", names=True)
+    area, felt = force["cut_area_m2"], np.abs(force["force_y_n"])
+    # Fat is thin: the edge is held again soon before it comes to muscle.
+    found = [
+        np.median(felt[(area > 2e-6) & (area < 12e-6)]),
+        felt[np.argmax(area > 56e-6)],
+        np.median(felt[(area > 80e-6) & (area < 120e-6)]),
+    ]
+    np.testing.assert_allclose(found, 0.004 * np.array([1136.0, 200.0, 550.0]), rtol=0.05)
+    parts = {
+        row["name"]: row for row in json.loads((tmp_path / "summary.json").read_text())["labels"]
+    }
+    found = [parts[name]["cut_area_m2"] for name in ("skin", "fat", None)]
+    np.testing.assert_allclose(found, [16e-6, 48e-6, 64e-6], rtol=0.01)
+
+
+def test_a_part_that_was_to_be_spared_and_is_cut_is_said(tmp_path, capsys):
+    text = """
+    [body]
+    shape = "block"
+    cells = [6, 6, 2]
+    size = [0.03, 0.03, 0.008]
+    fixed = "left,right"
+    [[label]]
+    name = "vessel"
+    region = "0.01,0,0:0.02,0.03,0.008"
+    spare = true
+    [[stroke]]
+    kind = "straight"
+    speed = 0.1
+    """
+    (tmp_path / "scene.toml").write_text(text)
+    out = tmp_path / "out"
+    command = ["run", str(tmp_path / "scene.toml"), "--out", str(out)]
+    assert command_line(command) == EXIT_OK
+    assert "vessel was to be left whole" in capsys.readouterr().err
+    summary = json.loads((out / "summary.json").read_text())
+    (warning,) = [each for each in summary["warnings"] if each["kind"] == "spared"]
+    assert warning["cut_area_m2"] == pytest.approx(summary["cut_area_m2"], rel=1e-6)
+
+
+def test_a_label_with_number_and_region_is_refused(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(
+        f'[body]\nshape = "organ"\n[[label]]\nname = "a"\nlabel = 1\nregion = "{LOW}"\n'
+    )
+    assert command_line(["run", str(tmp_path / "scene.toml")]) == EXIT_WRONG_USE
+    assert "[[label]] number 1 has label and region" in capsys.readouterr().err
