@@ -150,6 +150,9 @@ class MaterialOptions:
     material: str | None = None
     """Name of a material (liver, kidney, skin, fat, muscle, gelatin, silicone), or a FILE.toml. The
     command `materials` lists the names and writes a file to start from."""
+    label: Annotated[tuple[str, ...], Parameter(name="--label", negative="")] = ()
+    """Material of a part of the body, by the number or the name that its label has in the scene or
+    the mesh file: 2=fat, or vessel=mine.toml. May be given several times."""
     calibrate: Flag = False
     "Measure the springs on this mesh first, and make them as stiff as requested. Law springs only."
     spring_error: Flag = False

@@ -2,6 +2,7 @@
 
 import logging
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,7 @@ def chosen_scene(
     file = _scene_or_mesh(name, tissue.body.mesh, tissue.body.scale)
     file = with_settings(with_environment(file, os.environ), tissue.settings)
     file = _with_figures(located(file), tissue.material.material, tissue.blade)
+    file = _with_labels(file, tissue.material.label)
     file = _with_strokes(file, arm)
     given = _given_keys(tissue, arm)
     for option, value in given.items():
@@ -173,6 +175,34 @@ def _with_figures(file: SceneFile, material: str | None, blade: BladeOptions) ->
     if in_file or given:
         content["blade"] = _measures(content.get("blade", {}), in_file | given)
     return file._replace(content=content, origins=origins)
+
+
+def _with_labels(file: SceneFile, given: Sequence[str]) -> SceneFile:
+    """Return a scene with the materials that options give to labels.
+
+    Raises:
+        UsageError: an option is no `LABEL=MATERIAL`.
+    """
+    rows: list[dict[str, Any]] = [dict(row) for row in file.content.get("label", ())]
+    for text in given:
+        label, equals, material = text.partition("=")
+        if not (label and equals and material):
+            raise UsageError(
+                f"--label {text} has no label and no material; write --label 2=fat, or a name that "
+                "the label has: --label vessel=mine.toml"
+            )
+        if is_toml_file(material):
+            table = read_figures(Path(material), "material", "blade")
+        else:
+            table = {"preset": material}
+        key: dict[str, Any] = {"label": int(label)} if label.isdecimal() else {"name": label}
+        known = next((row for row in rows if key.items() <= row.items()), None)
+        if known is None:
+            # A part without a name of its own is called by its material.
+            known = {"name": Path(material).stem} | key
+            rows.append(known)
+        known["material"] = table
+    return file._replace(content={**file.content, "label": rows}) if given else file
 
 
 def _given_measures(blade: BladeOptions) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from scalpel_sim.arm.standing import Tabletop
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.labels import unused_labels
 from scalpel_sim.scene.scene import Scene, naming_table
 from scalpel_sim.scene.schema import AttachmentTable, LedSupportTable
 from scalpel_sim.strokes.stroke import from_csv
@@ -222,6 +223,9 @@ def check_scene(scene: Scene) -> None:
         if stroke.file is not None:
             from_csv(stroke.file)
     mesh = scene.mesh()
+    unused = unused_labels(mesh, scene.labels)
+    if unused is not None:
+        _log.warning("%s", unused)
     fixed_nodes(mesh, scene.body.fixed)
     pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by)
     for i, attachment in enumerate(scene.attachments):

@@ -9,6 +9,9 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.schema import LabelTable
 from tissue import TetrahedralMesh
 
+_MOST_NAMED = 20
+"""Labels that a message names at most."""
+
 
 def labelled(mesh: TetrahedralMesh, rows: Sequence[LabelTable]) -> TetrahedralMesh:
     """Return a mesh with the labels and names of these tables.
@@ -43,6 +46,28 @@ def labelled(mesh: TetrahedralMesh, rows: Sequence[LabelTable]) -> TetrahedralMe
     return mesh._replace(labels=labels, label_names=names)
 
 
+def unused_labels(mesh: TetrahedralMesh, rows: Sequence[LabelTable]) -> str | None:
+    """Return what to say of labels of a mesh that no table is about; None where there are none."""
+    if mesh.labels is None or rows:
+        return None
+    labels, counts = np.unique(mesh.labels, return_counts=True)
+    if len(labels) == 1:
+        return None
+    named = [
+        f"{label}{_quoted(mesh.label_names.get(label))} of {n:,} tetrahedra"
+        for label, n in zip(labels.tolist(), counts.tolist(), strict=True)
+    ]
+    first = labels.tolist()[-1]
+    return (
+        f"the mesh has labels, and the body is of one material: {', '.join(named[:_MOST_NAMED])}. "
+        f"--label {first}=MATERIAL, or [[label]] of a scene, gives one its own"
+    )
+
+
+def _quoted(name: str | None) -> str:
+    return "" if name is None else f" '{name}'"
+
+
 def _label_of(mesh: TetrahedralMesh, row: LabelTable) -> int:
     """Return the label of the mesh that a table without a region is about."""
     present = [] if mesh.labels is None else np.unique(mesh.labels).tolist()
@@ -52,7 +77,7 @@ def _label_of(mesh: TetrahedralMesh, row: LabelTable) -> int:
         found = [label for label, name in mesh.label_names.items() if name == row.name]
     if len(found) == 1:
         return found[0]
-    names = [f"{label} '{mesh.label_names.get(label, '')}'" for label in present[:20]]
+    names = [f"{label}{_quoted(mesh.label_names.get(label))}" for label in present[:_MOST_NAMED]]
     known = f"it has {', '.join(names)}" if names else "it has none"
     asked = f"'{row.name}'" if row.label is None else f"{row.label}"
     raise UsageError(

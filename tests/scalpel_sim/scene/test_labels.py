@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from scalpel_sim.cli.app import command_line
+from scalpel_sim.cli.options import BodyOptions, MaterialOptions, TissueOptions
+from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE, UsageError
+from scalpel_sim.preparation.tissue import check_scene
 from scalpel_sim.scene.labels import labelled
 from scalpel_sim.scene.schema import LabelTable
-from tissue import block
+from tissue import MATERIALS, block, write_mesh
 
 MESH = block((4, 4, 4), (0.04, 0.04, 0.04))
 LOW, HIGH = "0,0,0:0.04,0.04,0.02", "0,0,0.02:0.04,0.04,0.04"
@@ -101,3 +104,37 @@ def test_a_label_with_number_and_region_is_refused(tmp_path, capsys):
     )
     assert command_line(["run", str(tmp_path / "scene.toml")]) == EXIT_WRONG_USE
     assert "[[label]] number 1 has label and region" in capsys.readouterr().err
+
+
+def test_an_option_gives_a_label_of_a_mesh_file_its_material(tmp_path):
+    middles = MESH.positions[MESH.tetrahedra].mean(axis=1)
+    mesh = MESH._replace(labels=1 + (middles[:, 2] > 0.02))
+    write_mesh(tmp_path / "two.vtu", mesh)
+    body = BodyOptions(mesh=tmp_path / "two.vtu")
+    material = MaterialOptions(material="muscle", label=("2=fat",))
+    scene = chosen_scene(None, TissueOptions(body=body, material=material))
+    fat, muscle = (MATERIALS[name].material for name in ("fat", "muscle"))
+    assert scene.materials == {None: muscle, "fat": fat}
+    assert scene.mesh().label_names == {2: "fat"}
+
+
+@pytest.mark.parametrize(
+    ("label", "message"),
+    [("2", "has no label and no material"), ("2=ft", "fat"), ("7=fat", "has no label 7")],
+)
+def test_an_option_for_a_label_that_cannot_be_is_explained(tmp_path, label, message):
+    write_mesh(tmp_path / "one.vtu", MESH._replace(labels=np.ones(len(MESH.tetrahedra), np.int64)))
+    options = TissueOptions(
+        body=BodyOptions(mesh=tmp_path / "one.vtu"),
+        material=MaterialOptions(material="muscle", label=(label,)),
+    )
+    with pytest.raises(UsageError, match=message):
+        chosen_scene(None, options).mesh()
+
+
+def test_labels_of_a_file_that_nothing_uses_are_said(tmp_path, caplog):
+    labels = np.arange(len(MESH.tetrahedra)) % 2
+    write_mesh(tmp_path / "two.vtu", MESH._replace(labels=labels))
+    body = BodyOptions(mesh=tmp_path / "two.vtu")
+    check_scene(chosen_scene(None, TissueOptions(body=body)))
+    assert "labels, and the body is of one material: 0 of 192 tetrahedra, 1 of 192" in caplog.text
