@@ -66,7 +66,7 @@ class Tissue(BodyView):
         mesh, averages_shear = expect_sound(mesh), solver.element == "averaged"
         materials = materials_of(mesh, material or Material(), averages_shear=averages_shear)
         self.material = materials.reference
-        self.label_names, others = mesh.label_names, (blade, floor, solver)
+        self.label_names, others = dict(mesh.label_names), (blade, floor, solver)
         """Names of labels, of those that have one."""
         self.blade, self.floor, self.solver = others
         self._stages = assembled(mesh, fixed, positions, gravity, materials, *others)

@@ -76,7 +76,7 @@ def summary_of(
             frame=None,
             settings={"stroke": "straight", "material": material or {}},
             tissue=SimpleNamespace(scene="block", n_tetrahedra=6),
-            first=None,
+            first=body(),
             last=body(),
             report=CUT_REPORT,
             wall_seconds=wall_seconds,
