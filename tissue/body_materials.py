@@ -29,7 +29,7 @@ LabelKey = int | str | None
 
 
 class BodyMaterials(NamedTuple):
-    """What the tetrahedra of a body are made of."""
+    """Materials of the tetrahedra of a body."""
 
     table: MaterialArrays
     """The materials, each with its label."""

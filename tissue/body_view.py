@@ -133,7 +133,7 @@ class BodyView:
     """What there is to read of the body of a `Tissue`."""
 
     material: Material
-    """What the body is made of; of several materials that which resists changes of volume most."""
+    """Material of the body; of several that which resists changes of volume most."""
     _model: TissueModel
 
     @property

@@ -37,7 +37,8 @@ class Filled(NamedTuple):
 
     def notes(self) -> tuple[str, ...]:
         """Return what was done, one line each."""
-        bound = f"the surface moved by at most {1e3 * self.sizes.tolerance:.2g} mm"
+        # One way alone: a ridge of the file may be rounded by more.
+        bound = f"the new surface is within {1e3 * self.sizes.tolerance:.2g} mm of that of the file"
         return (*self.surface.notes, bound)
 
 
@@ -54,7 +55,7 @@ def fill(
     """Return tetrahedra inside the surface in a file.
 
     Holes are closed, and parts that overlap are one body. The mesh of a file is not the same to the
-    bit each time: fTetWild goes through sets in the order of addresses.
+    bit each time, on one thread too.
 
     Args:
         path: The file of the surface.

@@ -108,7 +108,7 @@ def _sections(data: bytes) -> Iterator[_Section]:
 
 
 class _Model:
-    """What has been read so far."""
+    """Parts that have been read so far."""
 
     def __init__(self) -> None:
         self._nodes: list[tuple[IntArray, FloatArray]] = []

@@ -1,4 +1,4 @@
-"""What is in a file of a mesh: the cells that it lists, made into tetrahedra with labels."""
+"""Content of a file of a mesh: the cells that it lists, made into tetrahedra with labels."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -30,7 +30,7 @@ class CellBlock(NamedTuple):
     nodes: IntArray
     """Nodes of each, corners first, shape (n_cells, n_nodes): indices from 0 on, or tags."""
     ids: IntArray
-    """What the file calls each, shape (n_cells,)."""
+    """Number of each in the file, shape (n_cells,)."""
     labels: IntArray | None = None
     """Label of each, shape (n_cells,); None: the file gives none."""
 
@@ -45,7 +45,7 @@ class MeshFile(NamedTuple):
     cells: Mapping[str, int]
     """Number of cells of each type that the file lists."""
     remarks: tuple[str, ...]
-    """What was made of the content, and what was left out: sentences for people."""
+    """Sentences on what was made of the content, and what was left out."""
 
 
 def mesh_file(
@@ -181,7 +181,7 @@ def _incidence(cells: IntArray, n_nodes: int) -> csr_array:
 
 
 def _straightened(volumes: Sequence[CellBlock], positions: FloatArray) -> list[str]:
-    """Say which cells are of higher order, and how far off their corners' edges they reach."""
+    """Describe the cells of higher order, and how far off their corners' edges they reach."""
     said = []
     for block in volumes:
         kind, nodes = block.cell_type, block.nodes

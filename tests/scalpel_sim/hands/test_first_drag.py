@@ -30,7 +30,7 @@ KINDS = [("organ", "desk"), ("skin", "phone"), ("gelatin", "tablet"), ("retract"
 edge that lies, and cuts down or up. Blocks come in all windows."""
 
 ALL = [(scene, size) for scene in SCENES for size in SIZES]
-"""What `pytest --long` drags across instead."""
+"""Scenes and sizes of `pytest --long`."""
 
 STEPS, PAUSE = 20, 0.04
 """Moves of a drag, and the time between two of them [s]."""
