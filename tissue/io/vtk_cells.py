@@ -67,7 +67,7 @@ def cell_blocks(
     blocks = []
     for number in np.unique(types).tolist():
         cells = np.flatnonzero(types == number)
-        kind = _CELL_TYPES.get(number, CellType(f"cells of type {number}", 3, 0))
+        kind = _type_of(number)
         _check_sizes(kind, cells, sizes)
         for size in np.unique(sizes[cells]).tolist():
             alike = cells[sizes[cells] == size]
@@ -75,6 +75,11 @@ def cell_blocks(
             of_cells = None if labels is None else labels[alike]
             blocks.append(CellBlock(kind, nodes, alike, of_cells))
     return blocks
+
+
+def _type_of(number: int) -> CellType:
+    """Return what a type of VTK is; one that is not known may hold a volume."""
+    return _CELL_TYPES.get(number, CellType(f"cells of type {number}", 3, 0))
 
 
 def _check_sizes(cell_type: CellType, cells: IntArray, sizes: IntArray) -> None:
@@ -88,21 +93,28 @@ def _check_sizes(cell_type: CellType, cells: IntArray, sizes: IntArray) -> None:
 
 
 def labels_among(
-    names: Sequence[str], values_of: Callable[[str], npt.NDArray[np.generic]]
+    types: IntArray, names: Sequence[str], values_of: Callable[[str], npt.NDArray[np.generic]]
 ) -> tuple[IntArray | None, list[str]]:
     """Return the labels of cells, if they are among arrays, and what is to be said of them.
 
+    What an array has of lines and faces makes it no less of labels; theirs are 0 in the result.
+
     Args:
+        types: VTK's type of each cell, shape (n_cells,).
         names: Names of the arrays of numbers, one for each cell.
         values_of: Returns the numbers of an array.
     """
     name = label_array(names)
     if name is None:
         return None, []
-    labels = as_labels(values_of(name))
-    if labels is None:
+    solid = [n for n in np.unique(types).tolist() if _type_of(n).dimension == 3]
+    of_solids = np.isin(types, solid)
+    found = as_labels(values_of(name)[of_solids])
+    if found is None:
         return None, [
             f"the cell data '{name}' are no labels, which are whole numbers from 0 on: left out"
         ]
+    labels = np.zeros(len(types), dtype=np.int64)
+    labels[of_solids] = found
     said = left_out(names, name)
     return labels, [] if said is None else [said]

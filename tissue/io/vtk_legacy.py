@@ -90,7 +90,7 @@ class _Reader:
         if len(self._types) != len(starts):
             reader.fail(f"expected {len(starts)} types of cells, found {len(self._types)}")
         arrays = self._cell_arrays(len(starts))
-        labels, said = labels_among(list(arrays), arrays.__getitem__)
+        labels, said = labels_among(self._types, list(arrays), arrays.__getitem__)
         blocks = cell_blocks(self._types, starts, sizes, flat, labels)
         form = "binary" if self._is_binary else "text"
         return mesh_file(

@@ -147,11 +147,11 @@ class _Piece:
         n_entries = int(ends[-1]) if n_cells else 0
         flat = self._ints("Cells/DataArray[@Name='connectivity']", n_entries)
         starts = np.concatenate([[0], ends])[:-1]
-        labels, said = self._labels(n_cells)
+        labels, said = self._labels(types)
         blocks = cell_blocks(types, starts, ends - starts, flat, labels)
         return mesh_file("VTK XML", positions, blocks, remarks=said)
 
-    def _labels(self, n_cells: int) -> tuple[IntArray | None, list[str]]:
+    def _labels(self, types: IntArray) -> tuple[IntArray | None, list[str]]:
         """Return the labels among the cell data, and what is to be said of them."""
         arrays = {
             each.get("Name", ""): each
@@ -159,7 +159,9 @@ class _Piece:
             if each.get("NumberOfComponents", "1").strip() == "1"
         }
         return labels_among(
-            list(arrays), lambda name: self._numbers(arrays[name], n_cells, f"cell data '{name}'")
+            types,
+            list(arrays),
+            lambda name: self._numbers(arrays[name], len(types), f"cell data '{name}'"),
         )
 
     def _count(self, attribute: str) -> int:

@@ -229,6 +229,14 @@ def test_data_that_are_no_labels_are_left_out_with_a_word(tmp_path, caplog):
     assert "the cell data 'material' are no labels" in caplog.text
 
 
+@pytest.mark.parametrize("suffix", ["vtk", "vtu"])
+def test_labels_of_tetrahedra_are_kept_whatever_the_faces_beside_them_have(tmp_path, suffix):
+    cells = [("triangle", PLAIN.tetrahedra[:5, :3]), ("tetra", PLAIN.tetrahedra)]
+    data = {"medit:ref": [np.full(5, -1), np.arange(48) % 3]}
+    meshio.Mesh(PLAIN.positions, cells, cell_data=data).write(tmp_path / f"a.{suffix}")
+    np.testing.assert_array_equal(read_mesh(tmp_path / f"a.{suffix}").labels, np.arange(48) % 3)
+
+
 # ------------------------------------------------------------------ other cells than tetrahedra
 
 
