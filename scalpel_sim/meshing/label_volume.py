@@ -89,9 +89,11 @@ def read_label_volume(path: Path, scale: float | None) -> LabelVolume:
             "needed, which a segmentation saves"
         )
     if not data.size or data.min() < 0 or data.max() == 0:
+        low, high = (data.min(), data.max()) if data.size else (0, 0)
         raise UsageError(
-            f"{path}: labels are 1, 2, 3, ... with 0 outside; there are "
-            f"{data.min() if data.size else 0} to {data.max() if data.size else 0}"
+            f"{path}: labels are 1, 2, 3, ... with 0 outside; there are {low} to {high}"
+            + ", as in an image: a label volume is needed, which a segmentation of it saves"
+            * bool(low < 0)
         )
     unit, notes = _unit(path, raw, scale)
     return LabelVolume(data.astype(np.int64), unit * raw.affine, raw.names, notes)

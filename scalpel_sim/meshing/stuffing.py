@@ -104,21 +104,23 @@ def stuff_volume(
 
 
 def _lost(mesh: "TetrahedralMesh", volume: LabelVolume, numbers: Sequence[int]) -> list[str]:
-    """Return a line for each label whose volume is not that of the file within a percent."""
+    """Return what to say of labels whose volumes are not those of the file within a percent."""
     from tissue.support import signed_volumes
 
     assert mesh.labels is not None
-    volumes, notes = signed_volumes(mesh.positions, mesh.tetrahedra), []
+    volumes, changed = signed_volumes(mesh.positions, mesh.tetrahedra), []
     for k, number in enumerate(numbers):
         own = volumes[mesh.labels == number].sum()
         wanted = (volume.labels == k + 1).sum() * volume.voxel_volume()
         if abs(own / wanted - 1.0) > 0.01:
             name = mesh.label_names.get(number, str(number))
-            notes.append(
-                f"label {name} has {own / wanted - 1.0:+.1%} of its volume in the file: parts "
-                "thinner than an edge are lost; a smaller --edge-length keeps them"
-            )
-    return notes
+            changed.append(f"{name} {own / wanted - 1.0:+.1%}" if own else f"{name} lost")
+    if not changed:
+        return []
+    return [
+        f"volumes against those in the file, by label: {', '.join(changed)}. Parts thinner than an "
+        "edge are lost; a smaller --edge-length, or fewer labels (--keep-labels), keeps them"
+    ]
 
 
 def _stuffed(

@@ -101,7 +101,7 @@ def test_many_labels_have_their_volumes_beside_one_that_is_smaller_than_a_cell(t
     own = volumes_by_label(made.mesh)
     for label in range(1, 7):
         assert own[label] == pytest.approx((labels == label).sum() * (WIDTH / n) ** 3, rel=0.01)
-    assert [note for note in made.notes if "label 30 has -100.0%" in note]
+    assert [note for note in made.notes if "by label: 30 lost." in note]
     assert quality(made.mesh.positions, made.mesh.tetrahedra).min() >= 0.1
 
 
@@ -144,7 +144,7 @@ def test_segments_of_3d_slicer_keep_their_names(tmp_path):
     ("labels", "said"),
     [
         (np.zeros((4, 4, 4), np.uint8), "with 0 outside"),
-        (np.full((4, 4, 4), -1, np.int16), "with 0 outside"),
+        (np.full((4, 4, 4), -1, np.int16), "as in an image: a label volume is needed"),
         (np.full((4, 4, 4), 0.5, np.float32), "not whole"),
         (np.ones((4, 4, 4, 2), np.uint8), "has 4 dimensions"),
     ],
