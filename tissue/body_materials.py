@@ -11,11 +11,8 @@ from tissue.material import Material
 from tissue.mesh.material_table import SCALED, MaterialArrays
 from tissue.types import TetrahedralMesh
 
-ALIKE = (
-    *("viscous_damping", "toughness_exponent", "toughness_speed", "prony"),
-    *("friction", "blade_friction", "blade_viscosity"),
-)
-"""Quantities that all materials of a body share: of the motion of the whole, or of the blade."""
+ALIKE = ("viscous_damping", "prony")
+"""Quantities that all materials of a body share: of the motion of the whole."""
 
 SPRINGS_ALIKE = ("retardation_time",)
 """Quantities that they share, besides, where springs carry the shear: dampers have the stiffness of

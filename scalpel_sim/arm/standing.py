@@ -45,6 +45,9 @@ TABLETOP = "tabletop"
 
 _TABLE_COLOUR = (0.32, 0.38, 0.4, 1.0)
 
+_ON_ARMS = 1.0
+"""Friction of a table against arms where it has the tissue's on the tissue: MuJoCo's default."""
+
 
 class Standing(Protocol):
     """An arm, a table, a fixture: anything that can be put into a model."""
@@ -129,13 +132,14 @@ class Tabletop(NamedTuple):
         name = free_prefix(spec, {"geoms": [TABLETOP]}) + TABLETOP
         quaternion, frame = np.empty(4), self.frame
         mujoco.mju_mat2Quat(quaternion, frame.rotation.ravel())
+        friction = self.geom.friction
         spec.worldbody.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=self.geom.size,
             pos=frame.points_to_world(self.centre),
             quat=quaternion,
-            friction=[self.geom.friction, 0.005, 0.0001],
+            friction=[_ON_ARMS if friction is None else friction, 0.005, 0.0001],
             solref=STEEL,
             contype=1 | STANDING,
             conaffinity=1,

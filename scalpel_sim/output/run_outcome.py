@@ -250,12 +250,15 @@ class RunOutcome:
         """The most that friction with the table held the body with [N]; None where more held it.
 
         Its normal force is the weight on it, and what the blade pushed down when it pulled hardest.
+        None as well where it rubs on each label with that label's own coefficient.
         """
         settings = self.settings
         others = self.first.fixed.any() or self.recording.hands or self.recording.n_held
         if settings.get("table") is None or "gravity" not in settings or others:
             return None
         given = settings.get("table_friction")
+        if given is None and not self.has_one_material:
+            return None
         friction = self.tissue.material.friction if given is None else given
         force = self.recording.vector("tissue_force")
         hardest = int(np.linalg.norm(force[:, :2], axis=1).argmax())
@@ -276,14 +279,15 @@ class RunOutcome:
             return None
         law = toughness_law_of(self.tissue.material, self.tissue.blade)
         slow = np.full(len(self.recording), law.toughness)
-        if law.exponent == 0.0:
+        exponent, doubling_speed = float(law.exponent[0]), float(law.doubling_speed[0])
+        if exponent == 0.0:
             return slow
         if self.stroke.is_led:
             return None
         middles = [self.stroke.pose(t) for t in self.stroke_times.tolist()]
         ways = np.diff([0.5 * (pose.tip + pose.heel) for pose in middles], axis=0)
         speeds = np.maximum((ways * self.forwards).sum(axis=1), 0.0) / self.dt
-        return np.asarray(slow * (1.0 + (speeds / law.doubling_speed) ** law.exponent))
+        return np.asarray(slow * (1.0 + (speeds / doubling_speed) ** exponent))
 
 
 def _downwards(gravity: float | tuple[float, ...]) -> float:

@@ -116,12 +116,16 @@ def tabletop_of(scene: Scene, bounds: FloatArray) -> Tabletop | None:
     world = scene.world
     if world.table is None:
         return None
-    friction = scene.material.friction if world.table_friction is None else world.table_friction
+    of_tissue = {material.friction for material in scene.all_materials}
+    # None: that of the label that touches.
+    friction = of_tissue.pop() if len(of_tissue) == 1 else None
+    if world.table_friction is not None:
+        friction = world.table_friction
     middle, half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])
     # Whole millimetres: the same table, whatever a body has sagged by before it is made.
     size = np.ceil(1e3 * (half[:2] + TABLE_MARGIN)) * 1e-3
     centre = np.array([*np.round(middle[:2], 3), world.table - TABLE_HALF_THICKNESS])
-    geom = Geom("tabletop", "box", (*size.tolist(), TABLE_HALF_THICKNESS), float(friction))
+    geom = Geom("tabletop", "box", (*size.tolist(), TABLE_HALF_THICKNESS), friction)
     return Tabletop(geom, centre)
 
 

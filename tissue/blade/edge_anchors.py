@@ -14,10 +14,10 @@ from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
 from tissue.blade.toughness import (
     ANCHOR,
-    SKIN,
-    TOUGHNESS,
     ToughnessLaw,
+    skin_toughness_of,
     toughening_at,
+    toughness_of,
 )
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
@@ -171,14 +171,25 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
 
 
 @kernel
-def measure_toughening(anchors: Anchors, edge: Edge, dt: float, law: ToughnessLaw) -> None:
-    """Write the toughening at the forward speed of each sample in a time step of `dt` [s]."""
+def measure_toughening(
+    anchors: Anchors, body: Body, edge: Edge, dt: float, law: ToughnessLaw
+) -> None:
+    """Write the toughening at the forward speed of each sample in a time step.
+
+    Args:
+        anchors: Written; a number means nothing where a sample has no anchor.
+        body: The tissue, whose material at the anchor decides.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        law: Toughness of the tissue.
+    """
     n = len(anchors.state)
     forward = pose_at(edge, 0.5).forward
     for k in range(n):
         moved = sample_displacement(edge, k, n)
         speed = max(dot(moved, forward), 0.0) / dt if dt > 0.0 else 0.0
-        anchors.toughening[k] = toughening_at(law, speed)
+        material = body.material[anchors.tetrahedron[k]]
+        anchors.toughening[k] = toughening_at(law, material, speed)
 
 
 @kernel
@@ -231,11 +242,10 @@ def holding_weight(anchors: Anchors, k: int, i: int) -> float:
 def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area as it is now at which anchor `k` slips [J/m2]."""
     share: float = anchors.rest_share[k]
-    relative = anchors.relative
-    toughness: float = relative[k, TOUGHNESS] * law.toughness * (1.0 + anchors.toughening[k])
+    relative, toughening = anchors.relative, anchors.toughening[k]
     if anchors.at_skin[k]:
-        toughness = max(relative[k, SKIN] * law.skin_toughness, toughness)
-    return share * toughness
+        return share * skin_toughness_of(law, relative, k, toughening)
+    return share * toughness_of(law, relative, k, toughening)
 
 
 @kernel

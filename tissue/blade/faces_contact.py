@@ -93,16 +93,18 @@ class FaceContacts(Arrays):
     """Distance from the edge to the back of the blade [m]."""
     stiffness: float
     """Pressure per depth [Pa/m]."""
-    friction: float
-    """Coulomb's coefficient."""
-    viscosity: float
-    """Shear stress per sliding speed [Pa s/m]."""
     margin: float
     """Distance from the blade up to which faces are in contact or may soon be [m]."""
     face: IntArray
     """Each face, as 4 * tetrahedron + corner opposite; shape (capacity,)."""
     node: IntArray
     """Nodes of each face, shape (capacity, 3)."""
+    friction: FloatArray
+    """Coulomb's coefficient of the tetrahedron behind each face, shape (capacity,)."""
+    viscosity: FloatArray
+    """Shear stress per sliding speed of that tetrahedron [Pa s/m], shape (capacity,)."""
+    of_materials: FloatArray
+    """These two of each material of the body, shape (n_materials, 2)."""
     states: ContactStates
     """State of each face."""
     row_of_face: IntArray
@@ -142,13 +144,12 @@ def new_face_contacts(
         slope=1.0 if shape is None else float(shape.slope),
         height=0.0 if shape is None else float(shape.height),
         stiffness=float(FACE_STIFFNESS * material.young_modulus / node_size),
-        friction=float(material.blade_friction),
-        viscosity=float(material.blade_viscosity),
         margin=float(SEARCH_MARGIN * node_size),
         row_of_face=np.full(0 if thin else 4 * n_tetrahedra, -1, np.int64),
         is_around=np.zeros(0 if thin else n_tetrahedra, np.int32),
         cells=np.full(6, -1, np.int64),
         outward=OUTWARD,
+        of_materials=np.array([[material.blade_friction, material.blade_viscosity]]),
         **_rows(0 if thin else _FACES_AT_FIRST),
     )
 
@@ -157,6 +158,8 @@ def _rows(capacity: int) -> dict[str, np.ndarray | ContactStates]:
     return {
         "face": np.zeros(capacity, np.int64),
         "node": np.zeros((capacity, 3), np.int64),
+        "friction": np.zeros(capacity),
+        "viscosity": np.zeros(capacity),
         "states": _new_states(capacity),
         "around": np.zeros(capacity, np.int64),
         "node_around": np.zeros((capacity, 4), np.int64),
@@ -182,7 +185,7 @@ def with_more_faces(sides: FaceContacts) -> FaceContacts:
     """Return the side contacts with room for twice as many faces."""
     n = 2 * len(sides.face)
     lists = ("face", "node", "around", "node_around", "found", "row_before")
-    names = (*lists, "divided", "node_before")
+    names = (*lists, "friction", "viscosity", "divided", "node_before")
     arrays = {name: grown(getattr(sides, name), n) for name in names}
     states = {name: grown(getattr(sides.states, name), n) for name in ContactStates.__annotations__}
     return sides.replaced(**arrays, states=ContactStates(**states), states_before=_new_states(n))
@@ -354,10 +357,8 @@ def friction_stretch(
     da = at.along - states.stuck_along[i, q]
     ds = at.behind - states.stuck_behind[i, q]
     stretch = np.sqrt(da * da + ds * ds)
-    limit = (
-        sides.friction * normal_force
-        + sides.viscosity * states.area[i] * states.sliding_speed[i, q]
-    )
+    viscous = sides.viscosity[i] * states.area[i] * states.sliding_speed[i, q]
+    limit = sides.friction[i] * normal_force + viscous
     most = limit / (sides.stiffness * states.area[i])
     if stretch <= most:
         return FrictionStretch(da, ds, 0.0)

@@ -140,11 +140,11 @@ def _slide_point(
     ds = at.behind - states.stuck_behind[i, q]
     stretch = np.sqrt(da * da + ds * ds)
     stiffness = sides.stiffness * states.area[i]
-    surplus = stiffness * stretch - sides.friction * normal_force
+    surplus = stiffness * stretch - sides.friction[i] * normal_force
     if surplus <= 0.0 or seconds <= 0.0:
         states.sliding_speed[i, q] = 0.0
         return
-    slide = surplus / (stiffness + sides.viscosity * states.area[i] / seconds)
+    slide = surplus / (stiffness + sides.viscosity[i] * states.area[i] / seconds)
     states.stuck_along[i, q] += slide * da / stretch
     states.stuck_behind[i, q] += slide * ds / stretch
     states.sliding_speed[i, q] = slide / seconds

@@ -320,6 +320,9 @@ def _replace_faces(blade: BladeState, body: Body, pose: BladePose, n: int) -> No
         face = sides.around[sides.found[i]]
         for corner in range(3):
             sides.node[row, corner] = sides.node_around[sides.found[i], corner]
+        material = body.material[face // 4]
+        sides.friction[row] = sides.of_materials[material, 0]
+        sides.viscosity[row] = sides.of_materials[material, 1]
         old = sides.row_before[i]
         is_part = old < 0 and continue_contact(blade, body, row, n_divided)
         # A face in contact keeps its side and area: measuring a trembling lip again in each step

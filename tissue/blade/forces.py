@@ -34,6 +34,7 @@ from tissue.blade.spine_forces import (
     slip_spine,
 )
 from tissue.blade.spine_search import release_spine
+from tissue.blade.toughness import depends_on_speed
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.elasticity.frequency.strained import limited_frequency
@@ -80,11 +81,11 @@ def begin_blade_step(
         anchors.cut[k] = 0.0
     law = blade.toughness
     is_other = is_in_other_material(anchors, body, law)
-    if law.exponent == 0.0 and not is_other:  # then nothing changes the energy
-        measure_toughening(anchors, edge, dt, law)
+    if not depends_on_speed(law) and not is_other:  # then nothing changes the energy
+        measure_toughening(anchors, body, edge, dt, law)
         return True
     before = edge_energy(blade, body, edge, 0.0)
-    measure_toughening(anchors, edge, dt, law)
+    measure_toughening(anchors, body, edge, dt, law)
     if is_other:
         for k in range(len(anchors.state)):
             take_material(anchors, body, law, k)

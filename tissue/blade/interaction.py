@@ -93,7 +93,7 @@ class BladeInteraction:
         self._views: dict[int, RigidContacts] = {}
 
     def take_materials(self, materials: MaterialArrays) -> None:
-        """Take the materials of the body: the toughness and the stiffness of each."""
+        """Take the materials of the body: toughness, stiffness and friction of each."""
         toughness, skin = toughness_of_materials(materials, self._shape)
         numbers = (materials, self._material, self._shape, self._node_size)
         stiffest = float(materials.young_modulus.max())
@@ -102,9 +102,14 @@ class BladeInteraction:
             toughness=self.state.toughness.replaced(
                 toughness=float(toughness[0]),
                 skin_toughness=float(skin[0]),
+                exponent=materials.toughness_exponent,
+                doubling_speed=materials.toughness_speed,
                 relative=relative_numbers(*numbers),
             ),
-            sides=self.state.sides.replaced(stiffness=stiffness),
+            sides=self.state.sides.replaced(
+                stiffness=stiffness,
+                of_materials=np.stack([materials.blade_friction, materials.blade_viscosity], 1),
+            ),
         )
 
     def _first_of(self, materials: MaterialArrays) -> Material:

@@ -23,11 +23,10 @@ import numpy as np
 from tissue.blade.edge import BladePose, Edge, pose_at
 from tissue.blade.toughness import (
     SIDE,
-    SKIN,
-    TOUGHNESS,
     ToughnessLaw,
-    skin_toughness_at,
-    toughness_at,
+    skin_toughness_of,
+    toughening_at,
+    toughness_of,
 )
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
@@ -85,8 +84,6 @@ class SpineContacts(Arrays):
 
     n_pressing: IntCell
     """Number of samples that press or pierce."""
-    friction: float
-    """Coulomb's coefficient."""
     law: StripLaw
     """Depth to which the sides sink into the tissue that the mesh does not resolve."""
     state: IntArray
@@ -114,6 +111,10 @@ class SpineContacts(Arrays):
     """Energy stored in the sample when slip was applied last [J], shape (n,)."""
     relative: FloatArray
     """`ToughnessLaw.relative` of the tissue that each sample touches, shape (n, 4)."""
+    material: IntArray
+    """Row of that tissue among the materials of the body, shape (n,)."""
+    friction: FloatArray
+    """Its coefficient of friction, shape (n,)."""
     speed: FloatArray
     """Speed at which the tip's end moves outward in this step [m/s], shape (n,); 0 of other
     sides. It decides the toughness, as that of the edge does."""
@@ -223,7 +224,6 @@ def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> SpineCont
     side, along, behind, length, stiffness = rows.T.copy()
     return SpineContacts(
         n_pressing=0,
-        friction=friction,
         law=law,
         state=np.full(n, IDLE),
         side=side.astype(np.int64),
@@ -237,6 +237,8 @@ def _new_contacts(friction: float, law: StripLaw, rows: FloatArray) -> SpineCont
         held=np.zeros((n, 2)),
         energy=np.zeros(n),
         relative=np.ones((n, 4)),
+        material=np.zeros(n, np.int64),
+        friction=np.full(n, friction),
         speed=np.zeros(n),
     )
 
@@ -300,7 +302,7 @@ def press_of(
     beside = spine.held[k, 0] + dot(stretch, side.beside)
     across = spine.held[k, 1] + dot(stretch, normal)
     size = np.sqrt(beside * beside + across * across)
-    most = spine.friction * (depth - surplus)
+    most = spine.friction[k] * (depth - surplus)
     if size <= most:
         return Press(depth - surplus, surplus, beside, across, 0.0)
     return Press(depth - surplus, surplus, beside * most / size, across * most / size, size - most)
@@ -316,10 +318,12 @@ def piercing_depth(spine: SpineContacts, k: int, law: ToughnessLaw) -> float:
 @kernel
 def tip_toughness(spine: SpineContacts, k: int, law: ToughnessLaw) -> float:
     """Return the energy per area at which sample `k` of the tip's end pierces [J/m2]."""
+    relative = spine.relative
+    toughening = toughening_at(law, spine.material[k], spine.speed[k])
     if spine.state[k] == PIERCING:
-        toughness: float = spine.relative[k, TOUGHNESS] * toughness_at(law, spine.speed[k])
+        toughness: float = toughness_of(law, relative, k, toughening)
     else:
-        toughness = spine.relative[k, SKIN] * skin_toughness_at(law, spine.speed[k])
+        toughness = skin_toughness_of(law, relative, k, toughening)
     return toughness
 
 

@@ -176,6 +176,7 @@ def _set_point(blade: BladeState, body: Body, k: int, t: int, w: Weights) -> Non
     spine, row = blade.spine, body.material[t]
     for i in range(4):
         spine.relative[k, i] = blade.toughness.relative[row, i]
+    spine.material[k], spine.friction[k] = row, blade.sides.of_materials[row, 0]
     spine.tetrahedron[k] = t
     spine.weights[k, 0], spine.weights[k, 1] = w.a, w.b
     spine.weights[k, 2], spine.weights[k, 3] = w.c, w.d

@@ -31,10 +31,12 @@ class ToughnessLaw(Arrays):
     """Energy per area of a slow cut [J/m2]."""
     skin_toughness: float
     """Energy per area until the edge has broken the skin, in a slow cut [J/m2]."""
-    exponent: float
-    """Exponent of the dependence on speed; 0 for none."""
-    doubling_speed: float
-    """Speed at which the toughness is twice that of a slow cut [m/s]."""
+    exponent: FloatArray
+    """Exponent of the dependence on speed of each material of the body; 0 for none. Shape
+    (n_materials,)."""
+    doubling_speed: FloatArray
+    """Speed at which the toughness of each is twice that of a slow cut [m/s], shape
+    (n_materials,)."""
     relative: FloatArray
     """Numbers of each material of the body over those of the first, shape (n_materials, 4):
     toughness, skin toughness, stiffness of anchors, and of blunt sides (`TOUGHNESS` and so on)."""
@@ -51,8 +53,8 @@ def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessL
     return ToughnessLaw(
         toughness=float(material.toughness + blunt),
         skin_toughness=float(max(material.skin_toughness, material.toughness) + blunt),
-        exponent=float(material.toughness_exponent),
-        doubling_speed=float(material.toughness_speed),
+        exponent=np.array([float(material.toughness_exponent)]),
+        doubling_speed=np.array([float(material.toughness_speed)]),
         relative=np.ones((1, 4)),
     )
 
@@ -67,30 +69,53 @@ def toughness_of_materials(
 
 
 @kernel
-def toughening_at(law: ToughnessLaw, speed: float) -> float:
-    """Return the share by which tissue is tougher at a speed [m/s] than in a slow cut: (v / v0)^n.
-
-    The power takes as long as the rest of the force of an anchor.
-    """
-    if law.exponent == 0.0 or speed <= 0.0:
-        return 0.0
-    return (speed / law.doubling_speed) ** law.exponent  # type: ignore[no-any-return]
+def depends_on_speed(law: ToughnessLaw) -> bool:
+    """Return whether the toughness of any material does."""
+    highest = 0.0
+    for exponent in law.exponent:
+        highest = max(highest, exponent)
+    return highest > 0.0
 
 
 @kernel
-def toughness_at(law: ToughnessLaw, speed: float) -> float:
-    """Return the energy per area of a cut at that speed [m/s]: J0 (1 + (v / v0)^n) [J/m2]."""
-    toughness: float = law.toughness * (1.0 + toughening_at(law, speed))
+def toughening_at(law: ToughnessLaw, material: int, speed: float) -> float:
+    """Return the share by which tissue is tougher at a speed [m/s] than in a slow cut: (v / v0)^n.
+
+    The power takes as long as the rest of the force of an anchor.
+
+    Args:
+        law: The law.
+        material: Row of the tissue among the materials of the body.
+        speed: Speed of the edge [m/s].
+    """
+    exponent: float = law.exponent[material]
+    if exponent == 0.0 or speed <= 0.0:
+        return 0.0
+    return (speed / law.doubling_speed[material]) ** exponent  # type: ignore[no-any-return]
+
+
+@kernel
+def toughness_of(law: ToughnessLaw, relative: FloatArray, k: int, toughening: float) -> float:
+    """Return the energy per area of a cut: J0 (1 + (v / v0)^n) [J/m2].
+
+    Args:
+        law: The law.
+        relative: `ToughnessLaw.relative` of the tissue that each sample is in, shape (n, 4).
+        k: The sample.
+        toughening: `toughening_at` its speed.
+    """
+    toughness: float = relative[k, TOUGHNESS] * law.toughness * (1.0 + toughening)
     return toughness
 
 
 @kernel
-def skin_toughness_at(law: ToughnessLaw, speed: float) -> float:
-    """Return the energy per area of breaking the skin at that speed [m/s]: [J/m2].
+def skin_toughness_of(law: ToughnessLaw, relative: FloatArray, k: int, toughening: float) -> float:
+    """Return the energy per area of breaking the skin [J/m2]; see `toughness_of`.
 
     It is that of the skin, or that of the tissue at this speed where that is more.
     """
-    return max(law.skin_toughness, toughness_at(law, speed))
+    skin: float = relative[k, SKIN] * law.skin_toughness
+    return max(skin, toughness_of(law, relative, k, toughening))
 
 
 def expect_toughness_in_range(material: Material, node_size: float) -> None:

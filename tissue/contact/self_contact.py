@@ -138,6 +138,11 @@ class SelfContact:
         self._search_contacts = SameTypes(search_contacts)
         self._find_pieces(body)
 
+    def take_friction(self, friction: float) -> None:
+        """Take the coefficient of a body that has one; of others it comes with the next list."""
+        self.forces.friction[:] = friction
+        self.search.is_listing_due = 1
+
     def take_frequency(self, frequency_squared: float) -> None:
         """Set stiffness and damping for a body of that bound on w^2 before any cut [1/s2]."""
         added = max(ADDED_SHARE * frequency_squared, LEAST_ADDED)

@@ -102,7 +102,7 @@ def _correct_reaction(contacts: GeomContacts, c: int) -> None:
     if contacts.sticks[c] == 0:
         now = vec3(contacts.force, c)
     pull = axpy(-dot(now, normal), normal, now)
-    limit, length = contacts.geoms.friction[contacts.geom[c]] * press, norm(pull)
+    limit, length = contacts.friction[c] * press, norm(pull)
     share = min(limit / length, 1.0) if length > 0.0 else 0.0
     _change_reaction(contacts, c, sub(axpy(press, normal, scale(share, pull)), before))
 

@@ -15,6 +15,8 @@ from tissue.blade_shape import BladeShape
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact, no_geoms
 from tissue.contact.self_contact import SelfContact
+from tissue.core.array_types import IntArray
+from tissue.core.jit import SameTypes
 from tissue.core.structs import Arrays
 from tissue.core.thread_team import new_team
 from tissue.core.vec3 import Vec3
@@ -30,6 +32,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.material_table import MaterialArrays
+from tissue.mesh.node_friction import write_friction
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 from tissue.mesh.rigid_cores import RigidCores
 from tissue.mesh.star import LARGEST_STAR, mean_node_size, no_visits
@@ -39,6 +42,9 @@ INCREMENTS_TO_PIECES = 50
 """Increments of steps from a change of the mesh until loose pieces are found again: 50 ms in a
 usual run. Finding them costs half a step of the integrator. Until then a piece that came
 loose is taken as held, and drag slows its fall."""
+
+
+_WRITE_FRICTION = SameTypes(write_friction)
 
 
 class Numerics(NamedTuple):
@@ -94,8 +100,9 @@ class TissueModel:
             averages_shear=numerics.averages_shear,
             resists_collapse=numerics.moves_together,
         )
-        around = np.zeros(LARGEST_STAR, dtype=np.int64)
-        self.node_size = mean_node_size(body, self.visits, around)
+        self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
+        self._write_friction(np.arange(body.n_nodes))
+        self.node_size = mean_node_size(body, self.visits, self._around)
         """Mean node size of the body before any cut [m]."""
         self.interaction = BladeInteraction(blade, material, self.node_size, body.n_tetrahedra)
         if body.materials.n > 1:
@@ -141,10 +148,17 @@ class TissueModel:
         self.body = self.body.replaced(materials=materials)
         self.elasticity.take_materials(self.body, self.visits)
         self.interaction.take_materials(materials)
+        self._write_friction(np.arange(self.body.n_nodes))
+        self.contact.take_friction(float(materials.friction[0]))
+        self.geoms.search.is_due = 1
         self.contact.take_frequency(self.elasticity.frequency_squared)
         longest = float(materials.retardation_time.max())
         self.surroundings = self.surroundings.replaced(retardation_time=longest)
         self._set_damping()
+
+    def _write_friction(self, nodes: IntArray) -> None:
+        """Write the friction of nodes whose tetrahedra are other ones, or of other materials."""
+        _WRITE_FRICTION.call(self.body, self.visits, nodes, len(nodes), self._around)
 
     def _set_damping(self) -> None:
         """Divide damping into that in the stages of a step, and that between steps."""
@@ -265,8 +279,8 @@ class TissueModel:
             self.find_loose_pieces()
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
-        """Find loose pieces again some increments later."""
-        del changed
+        """Find loose pieces again some increments later, and the friction of the nodes."""
+        self._write_friction(changed.nodes)
         if self.increments_to_pieces == 0:
             self.increments_to_pieces = INCREMENTS_TO_PIECES
 

@@ -53,6 +53,9 @@ class Body(Arrays):
     """The part of the masses that mass scaling added [kg]: it has no weight. Shape (capacity,)."""
     fixed: BoolArray = sized("nodes")
     """Whether each node is fixed, shape (capacity,)."""
+    friction: FloatArray = sized("nodes")
+    """Coefficient of friction around each node, where materials differ in it
+    (`tissue.mesh.node_friction`); shape (capacity,)."""
     off_path: FloatArray = sized("nodes")
     """Distance of a cut's node from where the blade passed [m], the largest of several cuts; 0 for
     other nodes, -1 where no blade passed but a bridge was finished; shape (capacity,)."""

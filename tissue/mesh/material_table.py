@@ -30,6 +30,9 @@ SCALED: dict[str, tuple[str, ...]] = {
     "toughness": ("toughness", "skin_toughness", "work_to_rupture"),
     "stiffening": OF_STIFFENING,
     "retardation_time": ("retardation_time",),
+    "friction": ("friction",),
+    "blade_friction": ("blade_friction",),
+    "blade_viscosity": ("blade_viscosity",),
 }
 """Quantities that a factor can change, by the names of `Material`, and the columns of each."""
 
@@ -39,6 +42,8 @@ class MaterialArrays(Arrays):
 
     is_even: IntCell
     """1 where forces inside the body are those of one material, else 0."""
+    has_one_friction: IntCell
+    """1 where all have the same coefficient of friction, else 0."""
     label: IntArray = sized("materials")
     """Label of the tetrahedra: which part of the body they are."""
     young_modulus: FloatArray = sized("materials")
@@ -57,6 +62,10 @@ class MaterialArrays(Arrays):
     """Energy per volume of stretching to rupture [J/m3]."""
     retardation_time: FloatArray = sized("materials")
     """Viscosity over stiffness [s]."""
+    toughness_exponent: FloatArray = sized("materials")
+    """Exponent with which toughness rises with the speed of the cut."""
+    toughness_speed: FloatArray = sized("materials")
+    """Speed at which toughness is twice that of a slow cut [m/s]."""
     friction: FloatArray = sized("materials")
     """Coefficient of friction between faces of the tissue, and on the floor."""
     blade_friction: FloatArray = sized("materials")
@@ -113,7 +122,8 @@ class MaterialArrays(Arrays):
     @classmethod
     def quantities(cls) -> tuple[str, ...]:
         """Return the names of all columns but the label."""
-        return tuple(name for name in cls.__annotations__ if name not in ("label", "is_even"))
+        others = ("is_even", "has_one_friction", "label")
+        return tuple(name for name in cls.__annotations__ if name not in others)
 
     @property
     def n(self) -> int:
@@ -137,8 +147,17 @@ class MaterialArrays(Arrays):
         """Return the table of which `rows` are the rows."""
         label, *columns = (column.copy() for column in rows.T)
         named = dict(zip(cls.quantities(), columns, strict=True))
-        is_even = all((named[name] == named[name][0]).all() for name in ELASTIC)
-        return cls(is_even=int(is_even), label=label.astype(np.int64), **named)
+        return cls(
+            is_even=int(all(_is_one(named[name]) for name in ELASTIC)),
+            has_one_friction=int(_is_one(named["friction"])),
+            label=label.astype(np.int64),
+            **named,
+        )
+
+
+def _is_one(column: FloatArray) -> bool:
+    """Return whether all numbers of a column are the same."""
+    return bool((column == column[0]).all())
 
 
 def _of_density(density: EnergyDensity | None, name: str) -> float:

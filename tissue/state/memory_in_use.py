@@ -78,7 +78,7 @@ _POOLS: Mapping[str, Mapping[str, Sequence[str]]] = {
 _OF_NODES = {
     "Body": (
         *("rest", "lattice_rest", "positions", "velocities", "masses", "added_masses", "fixed"),
-        *("off_path", "node_tetrahedron", "twin"),
+        *("friction", "off_path", "node_tetrahedron", "twin"),
     ),
     "Solid": (
         *("first", "room", "count", "node_volume", "weight", "dilatation", "frequency_squared"),

@@ -103,7 +103,7 @@ def _forces_of_blade(stages: StepStages) -> Iterator[ActingForce]:
         elif part == _FACE:
             face, q = divmod(index, POINTS)
             kind, name = "face", f"face {blade.sides.face[face]}, point {q}"
-            limit = blade.sides.friction * float(contacts.normal_force[row])
+            limit = float(blade.sides.friction[face] * contacts.normal_force[row])
             state = "slides" if blade.sides.states.sliding_speed[face, q] > 0.0 else "sticks"
         elif part == _BLUNT:
             side = blade.spine.side[index]
@@ -145,7 +145,7 @@ def _spine_sample(
     name = ("back", "end at the heel", "end at the tip")[spine.side[k]]
     if spine.state[k] == PIERCING:
         return f"{name}, sample {k}", "pierces", limit
-    most = spine.friction * float(contacts.normal_force[row])
+    most = float(spine.friction[k] * contacts.normal_force[row])
     slides = np.linalg.norm(contacts.friction[row]) >= AT_LIMIT * most
     return f"{name}, sample {k}", "slides" if slides else "sticks", most
 
@@ -242,7 +242,7 @@ def _forces_of_contact(forces: PenaltyForces, body: Body) -> Iterator[ActingForc
         push, stiffness = float(forces.push[c]), float(forces.stiffness[c])
         apart = weights @ body.positions[nodes]
         stretch = apart - (apart @ normal) * normal - forces.anchor[c]
-        limit = float(forces.friction) * push
+        limit = float(forces.friction[c]) * push
         pull = stiffness * float(np.linalg.norm(stretch))
         force = (
             push * normal - stiffness * min(limit / pull, 1.0) * stretch
@@ -279,7 +279,7 @@ def _forces_of_geoms(stages: StepStages) -> Iterator[ActingForce]:
             _force(contacts, i),
             float(np.linalg.norm(contacts.friction[i])),
             -float(arrays.gap[c]),
-            float(arrays.geoms.friction[g]) * float(contacts.normal_force[i]),
+            float(arrays.friction[c]) * float(contacts.normal_force[i]),
             "sticks" if arrays.sticks[c] else "slides" if arrays.touches[c] else "is released",
         )
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.support import bodies, incisions, strokes
 from tests.support.bodies import sides
-from tissue import Energies, Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import BladeShape, Energies, Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.mesh.validation import signed_volumes
 
 SIZE = np.array([0.04, 0.04, 0.02])
@@ -23,11 +23,16 @@ def labelled(axis: int, border: float, cells: float = CELL) -> TetrahedralMesh:
     return mesh._replace(labels=(middles[:, axis] > border).astype(np.int64))
 
 
-def drawn(mesh: TetrahedralMesh, **options) -> tuple[Energies, np.ndarray, np.ndarray]:
+BOTH = {None: SOFT, 1: TOUGH}
+
+
+def drawn(
+    mesh: TetrahedralMesh, materials=BOTH, **options
+) -> tuple[Energies, np.ndarray, np.ndarray]:
     """Draw an upright edge along y through a body; return energies, places of it, and forces."""
     solver = SolverSettings(audit=True)
     where = {"fixed": sides(mesh), "gravity": NO_GRAVITY, "solver": solver}
-    tissue = Tissue(mesh, {None: SOFT, 1: TOUGH}, **where | options)
+    tissue = Tissue(mesh, materials, **where | options)
     poses = strokes.upright(X, -0.004, 0.044, -0.004, 0.026, SPEED)
     results = strokes.make(tissue, poses)
     return (
@@ -53,6 +58,29 @@ def test_the_force_steps_at_the_border_within_an_element(border):
     passed = y[force > 0.5 * (before + after)][0]
     assert abs(passed - border) < CELL
     assert abs(energies.residual) < 0.02 * energies.work_of_blade
+
+
+def test_each_label_is_tougher_at_speed_by_its_own_law():
+    at_speed = SOFT.changed(toughness_exponent=0.5, toughness_speed=SPEED / 4.0)
+    energies, y, force = drawn(labelled(1, 0.02), {0: SOFT, 1: at_speed})
+    before, after = (force[(y > a) & (y < b)].mean() for a, b in ((0.008, 0.013), (0.028, 0.036)))
+    assert before == pytest.approx(20.0 * SIZE[2], rel=0.05)
+    assert after == pytest.approx((1.0 + 4.0**0.5) * 20.0 * SIZE[2], rel=0.05)
+    assert abs(energies.residual) < 0.02 * energies.work_of_blade
+
+
+def test_the_blade_rubs_on_each_label_with_its_own_friction():
+    """A blade that is wholly within a label is dragged as in a body of that label alone."""
+    rough = SOFT.changed(blade_friction=0.5, blade_viscosity=2000.0)
+    within, mesh = ((0.008, 0.013), (0.03, 0.036)), labelled(1, 0.02)
+    bodies_of = (SOFT, rough, {0: SOFT, 1: rough})
+    blade = BladeShape(thickness=1e-3, height=4e-3)
+    runs = [drawn(mesh, each, blade=blade) for each in bodies_of]
+    (_, y, force), forces = runs[2], [run[2] for run in runs]
+    for label, (low, high) in enumerate(within):
+        at = (y > low) & (y < high)
+        assert force[at].mean() == pytest.approx(forces[label][at].mean(), rel=0.02)
+    assert forces[1][at].mean() > 1.1 * forces[0][at].mean()
 
 
 @pytest.mark.parametrize("scheme", ["stellar", "paper"])

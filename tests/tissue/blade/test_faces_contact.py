@@ -27,6 +27,7 @@ from tissue.blade.faces_search import (
 from tissue.blade.known_faces import continue_contact, note_divided
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import CUT, build_body
+from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.star import no_visits
 from tissue.mesh.tetrahedron_grid import build_grid, list_moved
 
@@ -49,11 +50,15 @@ def edge_at(x, y=0.015, z=-0.01, forward=Vec3(0.0, 1.0, 0.0)):
 class Pressed:
     """The block, which ends at x = 10 mm, and a blade beside it with its side face at x - 1 mm."""
 
-    def __init__(self, x=0.0115, material=MATERIAL):
-        self.body = build_body(BLOCK, None, None)
+    def __init__(self, x=0.0115, material=MATERIAL, of_materials=None, rows=None):
+        table = None if of_materials is None else MaterialArrays.of(of_materials, [0, 1])
+        self.body = build_body(BLOCK, None, None, table, rows)
         anchors = new_anchors(2, LENGTH, 4.0 * material.young_modulus)
         n = len(BLOCK.tetrahedra)
         self.blade = new_blade_state(anchors, SHAPE, material, NODE_SIZE, n)
+        if table is not None:
+            numbers = np.stack([table.blade_friction, table.blade_viscosity], axis=1)
+            self.blade = self.blade.replaced(sides=self.sides.replaced(of_materials=numbers))
         self.totals = self.blade.totals
         self.forces = np.zeros_like(self.body.rest)
         self.find(edge_at(x))
@@ -96,6 +101,7 @@ class Pressed:
         for i, (a, b, c) in enumerate(wholes.tolist()):
             for row, corners in ((i, (a, len(x) + i, c)), (n + i, (c, len(x) + i, b))):
                 self.sides.node[row] = corners
+                self.sides.friction[row] = self.sides.of_materials[0, 0]
                 assert continue_contact(self.blade, self.body, row, n)
         self.sides.n_faces = 2 * n
 
@@ -150,6 +156,22 @@ def test_friction_holds_below_its_limit_and_slides_above(pressed):
     stuck = pressed.press(near)[1]
     assert stuck == pytest.approx(pressed.sides.stiffness * 0.0499e-3 * 0.01**2, rel=1e-6)
     assert pressed.press(far)[1] == pytest.approx(0.5 * normal, rel=1e-9)
+
+
+def test_each_face_rubs_with_the_friction_of_the_tetrahedron_behind_it():
+    rows = np.arange(len(BLOCK.tetrahedra)) % 2
+    materials = [Material(blade_friction=friction) for friction in (0.1, 0.7)]
+    pressed = Pressed(of_materials=materials, rows=rows)
+    pressed.press(edge_at(0.0108))
+    pressed.slide(edge_at(0.0108))
+    force = pressed.press(edge_at(0.0108, y=0.016))
+    sides = pressed.sides
+    behind = rows[sides.face[pressed.rows()] // 4]
+    area = POINTS * sides.states.area[pressed.rows()]
+    assert set(behind[area > 0.0]) == {0, 1}
+    pressure = sides.stiffness * 0.2e-3
+    each = [0.1, 0.7] @ np.array([area[behind == row].sum() for row in (0, 1)])
+    assert force[1] == pytest.approx(pressure * each, rel=1e-9)
 
 
 def test_friction_drags_tissue_along_the_edge_as_the_blade_moves_along_it(pressed):

@@ -8,7 +8,12 @@ from tissue import Material, block
 from tissue.blade.edge import Edge, pose_at
 from tissue.blade.edge_anchors import held_toughness, new_anchors
 from tissue.blade.return_mapping import AVERAGED_OVER, LARGEST_SHARE, set_anchor, update_rest_share
-from tissue.blade.toughness import skin_toughness_at, toughness_at, toughness_law_of
+from tissue.blade.toughness import (
+    skin_toughness_of,
+    toughening_at,
+    toughness_law_of,
+    toughness_of,
+)
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import build_body
 
@@ -83,5 +88,7 @@ def test_skin_costs_at_least_what_the_speed_asks_for():
         toughness=20.0, skin_toughness=50.0, toughness_exponent=0.5, toughness_speed=0.1
     )
     law = toughness_law_of(material, None)
-    assert skin_toughness_at(law, 0.1) == 50.0  # the tissue below has 40 J/m2
-    assert skin_toughness_at(law, 0.9) == toughness_at(law, 0.9) == pytest.approx(80.0)
+    slow, fast = toughening_at(law, 0, 0.1), toughening_at(law, 0, 0.9)
+    assert toughness_of(law, law.relative, 0, slow) == pytest.approx(40.0)
+    assert skin_toughness_of(law, law.relative, 0, slow) == 50.0
+    assert skin_toughness_of(law, law.relative, 0, fast) == pytest.approx(80.0)

@@ -17,7 +17,7 @@ from tissue.contact.geoms.geom_arrays import (
     motion_bound,
     place_geoms,
 )
-from tissue.contact.geoms.kinematic_contact import note_velocities, weighted
+from tissue.contact.geoms.kinematic_contact import friction_of, note_velocities, weighted
 from tissue.contact.geoms.signed_distance import Deepest, deepest_point, distance_to, is_flat_at
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -290,6 +290,7 @@ def _go_on(
     store(contacts.impulse, c, nothing)
     store(contacts.moment, c, nothing)
     store(contacts.pressed, c, nothing)
+    contacts.friction[c] = friction_of(contacts, body, c)
     contacts.is_held[c] = contacts.touches[c] = contacts.sticks[c] = 0
     distance = distance_to(
         contacts.geoms, contacts.geom[c], weighted(contacts, c, body.positions)

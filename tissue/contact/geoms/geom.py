@@ -38,8 +38,9 @@ class Geom(NamedTuple):
     """One of those above."""
     size: tuple[float, ...] = ()
     """Sizes of the shape [m], as many as it has."""
-    friction: float = 0.0
-    """Coefficient of friction between the geom and the tissue."""
+    friction: float | None = 0.0
+    """Coefficient of friction between the geom and the tissue; None: that of the tissue there
+    (`Material.friction`)."""
     vertices: FloatArray | None = None
     """Points of a mesh [m], shape (n, 3); None for other shapes."""
 
@@ -94,9 +95,11 @@ def planes_of(geom: Geom) -> FloatArray:
         raise ValueError(
             f"{what} has the shape {geom.shape!r}; there are {', '.join([*N_SIZES, 'mesh'])}"
         )
-    if not (math.isfinite(geom.friction) and geom.friction >= 0.0):
+    friction = geom.friction
+    if friction is not None and not (math.isfinite(friction) and friction >= 0.0):
         raise ValueError(
-            f"{what} has a friction of {geom.friction}; it must be finite and not negative"
+            f"{what} has a friction of {friction}; it must be finite and not negative, or None for "
+            "that of the tissue"
         )
     if geom.shape == "mesh":
         return _planes_of_hull(what, geom.vertices)

@@ -17,19 +17,14 @@ NODE_CONTACT = -1
 
 _WHOLE = ("geom", "face", "touches", "sticks", "is_held")
 
-_NUMBERS = ("gap", "mobility", "slop")
+_OF_TISSUE: Final = -1.0
+"""Friction of a geom that has none of its own."""
+
+_NUMBERS = ("friction", "gap", "mobility", "slop")
 
 _VECTORS = (
-    "weight",
-    "response",
-    "force",
-    "reaction",
-    "pressed",
-    "anchor",
-    "normal",
-    "point",
-    "impulse",
-    "moment",
+    *("weight", "response", "force", "reaction", "pressed"),
+    *("anchor", "normal", "point", "impulse", "moment"),
 )
 
 _OF_ROWS = ("node", *_WHOLE, *_NUMBERS, *_VECTORS)
@@ -55,7 +50,7 @@ class Geoms(Arrays):
     size: FloatArray
     """Sizes of each [m], shape (n, 3)."""
     friction: FloatArray
-    """Coefficient of friction of each, shape (n,)."""
+    """Coefficient of friction of each, shape (n,); negative: that of the tissue."""
     first_plane: IntArray
     """First row of each mesh in `plane`, and the end of the last; shape (n + 1,)."""
     plane: FloatArray
@@ -105,6 +100,8 @@ class GeomContacts(Arrays):
     """Nodes of each: the corners of a face, or three times the same; shape (2 * capacity, 3)."""
     weight: FloatArray
     """Weight of each node, which add up to 1; shape (2 * capacity, 3)."""
+    friction: FloatArray
+    """Coefficient of friction of each, shape (2 * capacity,)."""
     touches: IntArray
     """1 if it pressed after the last substep, else 0; shape (2 * capacity,)."""
     sticks: IntArray
@@ -215,7 +212,7 @@ def new_geoms(geoms: list[Geom]) -> Geoms:
     return Geoms(
         shape=np.array([shape_number(geom) for geom in geoms], np.int64),
         size=size,
-        friction=np.array([float(geom.friction) for geom in geoms]),
+        friction=np.array([_OF_TISSUE if g.friction is None else float(g.friction) for g in geoms]),
         first_plane=np.cumsum([0, *(len(rows) for rows in planes)], dtype=np.int64),
         plane=np.concatenate([np.zeros((0, 4)), *planes]),
         middle=np.array([middle for middle, _ in boxes]).reshape(n, 3),

@@ -29,6 +29,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.mesh.body import Body
+from tissue.mesh.node_friction import friction_of_row
 
 _PUSH_OF_FACE: Final = 0.03
 """Share of its depth by which a face is put out of a geom in a substep; a node is so wholly. Faces
@@ -157,7 +158,7 @@ def _correct_impulse(contacts: GeomContacts, body: Body, c: int, seconds: float,
     along = axpy(-approach, normal, relative)
     pull = axpy(-dot(normal, before), normal, before)
     pull = axpy(-1.0 / per_force, along, pull)
-    limit, length = contacts.geoms.friction[contacts.geom[c]] * press, norm(pull)
+    limit, length = contacts.friction[c] * press, norm(pull)
     if length > limit:
         pull = scale(limit / length, pull)
     now = axpy(press, normal, pull)
@@ -193,7 +194,7 @@ def _hold(contacts: GeomContacts, body: Body, c: int) -> None:
         return
     contacts.touches[c] = 1
     pull = norm(axpy(-press, normal, force))
-    sticks = pull < _SLIDING * geoms.friction[g] * press
+    sticks = pull < _SLIDING * contacts.friction[c] * press
     contacts.sticks[c] = 1 if sticks else 0
     if sticks and contacts.is_held[c] == 1:
         anchor = turned_from_geom(geoms.axes, g, vec3(contacts.anchor, c))
@@ -220,6 +221,17 @@ def _move(contacts: GeomContacts, body: Body, c: int, by: Vec3) -> None:
             work = dot(vec3(contacts.resistance, node), shift)
             contacts.dissipated += work
             contacts.half_work[node] += 0.5 * work
+
+
+@kernel
+def friction_of(contacts: GeomContacts, body: Body, c: int) -> float:
+    """Return the coefficient of friction of contact `c`."""
+    of_geom: float = contacts.geoms.friction[contacts.geom[c]]
+    if of_geom >= 0.0:
+        return of_geom
+    if body.materials.has_one_friction == 1:
+        return body.materials.friction[0]  # type: ignore[no-any-return]
+    return friction_of_row(body, contacts.node, contacts.weight, c)
 
 
 @kernel

@@ -109,8 +109,8 @@ class PenaltyForces(Arrays):
     """Scratch: the forces of eight contacts, and their pressures [N]; shape (8, 4)."""
     place: FloatArray
     """The numbers from 0 to 7."""
-    friction: float
-    """Coefficient of friction."""
+    friction: FloatArray
+    """Coefficient of friction of each contact, shape (2 * capacity,)."""
     retardation_time: float
     """Longest damping per stiffness [s]."""
 
@@ -144,7 +144,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         balance_work=np.zeros(WIDTH),
         acting=np.zeros((WIDTH, 4)),
         place=np.arange(float(WIDTH)),
-        friction=float(friction),
+        friction=np.full(rows, float(friction)),
         retardation_time=float(retardation_time),
     )
 
@@ -152,9 +152,10 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
 def grown_penalty_forces(forces: PenaltyForces, capacity: int) -> PenaltyForces:
     """Return the contacts with room for that many; the first list is the one in use."""
     n, used = forces.n_contacts, slice(forces.first, forces.first + forces.n_contacts)
-    larger = new_penalty_forces(capacity, forces.friction, forces.retardation_time)
+    # Of a body of one coefficient all rows have it, and those of others are written with each list.
+    larger = new_penalty_forces(capacity, float(forces.friction[0]), forces.retardation_time)
     of_rows = ("node", "weight", "normal", "height", "stiffness", "offset", "largest_depth")
-    for name in (*of_rows, "damping_time", "push", "anchor"):
+    for name in (*of_rows, "damping_time", "push", "anchor", "friction"):
         getattr(larger, name)[:n] = getattr(forces, name)[used]
     cells = ("n_contacts", "n_fading", "n_pressing", "work", "stored", "pressure_impulse")
     for name in (*cells, "penetration"):

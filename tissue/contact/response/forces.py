@@ -107,7 +107,7 @@ def _eight_forces(
     anchor = three_of(forces.anchor, c)
     stretch = sub(axpy(zero - along, normal, across), anchor)
     pull = axpy(tau, axpy(zero - approach, normal, velocity), stretch)
-    share = share_within(lanes(forces.friction) * depth, pull)
+    share = share_within(load_lanes(forces.friction, c) * depth, pull)
     total = axpy(force, normal, scale(zero - share * k, pull))
     is_acting = where_larger(free, zero, dot(total, total), zero)
     found = weights_on_line(x, w, total)
@@ -245,7 +245,7 @@ def _end_eight(
     depth = smaller(free, largest_depth)
     k = where_larger(free, zero, stiffness, zero)
     stretch = sub(tangential, anchor)
-    share, one = share_within(lanes(forces.friction) * depth, stretch), lanes(1.0)
+    share, one = share_within(load_lanes(forces.friction, c) * depth, stretch), lanes(1.0)
     stretch = scale(share, stretch)
     slid = sub(tangential, stretch)
     # What was released is slack where it is; what holds keeps its anchor to the last bit.

@@ -27,6 +27,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
 from tissue.mesh.body import Body
+from tissue.mesh.node_friction import friction_of_row
 
 _ROOM_SHARE = 0.5
 """Share of the room between a node's own bound on w^2 and the highest that its contacts may use.
@@ -172,17 +173,22 @@ def split_masses(
 ) -> None:
     """Write the stiffness of each contact; one with force continues by its offset (`_keep_force`).
 
+    Where materials differ in friction, that of each contact is written as well.
+
     Args:
-        forces: Stiffness, damping, offset, greatest depth, push, anchors and masses are written.
-            `stiffness` is as it was in the last list, or 0.
+        forces: Stiffness, friction, damping, offset, greatest depth, push, anchors and masses are
+            written. `stiffness` is as it was in the last list, or 0.
         limits: How stiff contact may be.
-        body: Masses and positions.
+        body: Masses, positions and friction.
         frequency_squared: Bound on w^2 of each node without contact [1/s2], shape (capacity,).
         share: Scratch, shape (capacity,).
     """
     rows = range(forces.first, forces.first + forces.n_contacts)
     list_touching_nodes(forces, share)
     fastest = _FASTEST_DAMPING * math.sqrt(limits.highest + limits.added)
+    if body.materials.has_one_friction == 0:
+        for c in rows:
+            forces.friction[c] = friction_of_row(body, forces.node, forces.weight, c)
     for c in rows:
         softness, mobility, squared = 0.0, 0.0, 0.0
         for q in range(4):

@@ -1,0 +1,58 @@
+"""The coefficient of friction of nodes of a body of several: that of the tetrahedra around them.
+
+A contact is between nodes, or points between them. Each side of it has the mean of its nodes, by
+their weights, and the two together have the smaller: what is wet makes both slip. That is the same
+whichever side is named first. Where nothing but a floor or a geom touches, the tissue decides.
+"""
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.geometry.tetrahedron import tetrahedron_volume
+from tissue.mesh.body import Body
+from tissue.mesh.star import Visits, sorted_star
+
+
+@kernel
+def write_friction(body: Body, visits: Visits, nodes: IntArray, n: int, around: IntArray) -> None:
+    """Write the friction of the first `n` of `nodes`: the mean around each, by volume at rest.
+
+    Args:
+        body: Written, if its materials differ in friction.
+        visits: For searches.
+        nodes: The nodes.
+        n: How many of them.
+        around: Scratch, shape (LARGEST_STAR,).
+    """
+    materials = body.materials
+    if materials.has_one_friction == 1:
+        return
+    for i in range(n):
+        node, total, volume = nodes[i], 0.0, 0.0
+        for k in range(sorted_star(body, visits, node, around)):
+            t = around[k]
+            share = tetrahedron_volume(body.rest, body.tetrahedra, t)
+            total += share * materials.friction[body.material[t]]
+            volume += share
+        body.friction[node] = total / volume
+
+
+@kernel
+def friction_of_row(body: Body, nodes: IntArray, weights: FloatArray, c: int) -> float:
+    """Return the coefficient of friction of contact `c`.
+
+    Args:
+        body: The body, whose materials differ in friction.
+        nodes: Nodes of contacts, shape (n, 3) or (n, 4).
+        weights: Weight of each node. Those of one side add up to 1, and those of the other, if it
+            is tissue as well, to -1.
+        c: The contact.
+    """
+    one, other, of_other = 0.0, 0.0, 0.0
+    for q in range(nodes.shape[1]):
+        weight, friction = weights[c, q], body.friction[nodes[c, q]]
+        if weight >= 0.0:
+            one += weight * friction
+        else:
+            other -= weight * friction
+            of_other -= weight
+    return min(one, other) if of_other > 0.0 else one
