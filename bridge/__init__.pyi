@@ -33,6 +33,7 @@ from .driven import GeomPoses as GeomPoses
 from .frames import TissueFrame as TissueFrame
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
+from .link import NamedLabel as NamedLabel
 from .link import SceneView as SceneView
 from .link import TissueDescription as TissueDescription
 from .link import TissueLink as TissueLink
@@ -77,6 +78,7 @@ __all__ = [
     "MAX_FRAMES_PER_ANSWER",
     "MAX_PLAUSIBLE_FORCE",
     "MAX_PLAUSIBLE_TORQUE",
+    "NamedLabel",
     "Proxy",
     "SceneView",
     "TcpLink",

@@ -56,6 +56,15 @@ class SceneView(NamedTuple):
     """Angle from the lower to the upper side of the picture."""
 
 
+class NamedLabel(NamedTuple):
+    """A label of a body that has a name."""
+
+    label: int
+    """The label."""
+    name: str
+    """Its name."""
+
+
 class TissueDescription(NamedTuple):
     """Description of a body in another process, for the side of the arm."""
 
@@ -75,6 +84,8 @@ class TissueDescription(NamedTuple):
     """Height of the floor that pieces land on [m]; None for no floor."""
     views: tuple[SceneView, ...] = ()
     """Cameras of the scene; the first of them at the start."""
+    labels: tuple[NamedLabel, ...] = ()
+    """Names of labels of the body, of those that have one."""
 
 
 class TissueLink(Protocol):
@@ -218,6 +229,7 @@ class InProcessLink:
             self._tissue.blade,
             self._tissue.floor,
             self._views,
+            tuple(NamedLabel(*each) for each in sorted(self._tissue.label_names.items())),
         )
 
     def step(

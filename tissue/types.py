@@ -297,6 +297,16 @@ class Surface(NamedTuple):
     """Indices into the vertices, shape (n_triangles, 3), counter-clockwise seen from outside."""
     is_cut: BoolArray
     """Whether the triangle is a face of a cut rather than skin, shape (n_triangles,)."""
+    labels: IntArray | None = None
+    """Label of the tetrahedron that each triangle is a face of, shape (n_triangles,). None: the
+    body has one label."""
+
+    def part(self, chosen: BoolArray) -> "Surface":
+        """Return some of the triangles, shape (n_triangles,), between the same vertices."""
+        labels = None if self.labels is None else self.labels[chosen]
+        return self._replace(
+            triangles=self.triangles[chosen], is_cut=self.is_cut[chosen], labels=labels
+        )
 
     def to_trimesh(self) -> "Trimesh":
         """Return the surface as a trimesh mesh [m], tissue frame, with all its pieces.

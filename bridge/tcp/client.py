@@ -109,8 +109,8 @@ class TcpLink:
 
     @property
     def label_names(self) -> Mapping[int, str]:
-        """Names of the labels of the body: the server does not send them."""
-        return {}
+        """Names of the labels of the body."""
+        return self._label_names
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
@@ -118,6 +118,7 @@ class TcpLink:
             MessageKind.HELLO, b"", LARGEST_DESCRIPTION, DESCRIPTION.unpack
         )
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
+        self._label_names = dict(description.labels)
         return description
 
     def step(

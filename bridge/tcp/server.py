@@ -34,7 +34,7 @@ from bridge.tcp.messages.driven import (
     unpack_geoms,
 )
 from bridge.tcp.messages.step import RESULT, StepReply, unpack_step
-from bridge.tcp.messages.text import DESCRIPTION, MAX_VIEWS, sent_scene_name
+from bridge.tcp.messages.text import DESCRIPTION, MAX_VIEWS, sent_labels, sent_scene_name
 from bridge.tcp.request_limits import RequestLimits
 from bridge.tcp.single_client import SingleClientServer
 from bridge.tcp.wire import Frame, MessageError, MessageKind
@@ -45,7 +45,7 @@ if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
 _logger = logging.getLogger(__name__)
 
 _QUERIES: dict[int, Callable[[InProcessLink], bytes]] = {
-    MessageKind.HELLO: lambda link: DESCRIPTION.pack(link.describe()),
+    MessageKind.HELLO: lambda link: _described(link),
     MessageKind.SNAPSHOT: lambda link: SNAPSHOT.pack(link.snapshot()),
     MessageKind.DEFORMATION: lambda link: DEFORMATION.pack(link.deformation()),
     MessageKind.SURFACE: lambda link: SURFACE.pack(link.surface()),
@@ -55,6 +55,12 @@ _QUERIES: dict[int, Callable[[InProcessLink], bytes]] = {
     MessageKind.QUALITY: lambda link: CUT_REPORT.pack(link.cut_report()),
 }
 """The requests without a content, and the contents of their replies."""
+
+
+def _described(link: InProcessLink) -> bytes:
+    """Return the reply to a HELLO."""
+    description = link.describe()
+    return DESCRIPTION.pack(description._replace(labels=sent_labels(description.labels)))
 
 
 def serve(

@@ -33,6 +33,7 @@ from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.looks import ORGAN_LOOK, Look, look_of_scene
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.textures import map_texture
 from tissue import FloatArray
@@ -161,13 +162,17 @@ def _two_hands(name: str) -> tuple[list[FloatArray], Drawn]:
         simulation.run(seconds)
         seen.append(moment_of(simulation))
     labels = [f"after {seconds:g} s" for seconds in TWO_HANDS[name]]
-    return _pictures(seen, scene.views), Drawn(scene.about, labels, _sizes(seen))
+    look = look_of_scene(scene)
+    pictures = _pictures(seen, scene.views, look if look.labels else ORGAN_LOOK)
+    return pictures, Drawn(scene.about, labels, _sizes(seen))
 
 
-def _pictures(seen: Sequence[Moment], cameras: Sequence[ViewTable] = ()) -> list[FloatArray]:
+def _pictures(
+    seen: Sequence[Moment], cameras: Sequence[ViewTable] = (), look: Look = ORGAN_LOOK
+) -> list[FloatArray]:
     """Return a picture of each moment with the instruments, all in one view."""
     view = view_of(seen, WITH_TOOL, cameras)
-    return [picture(view, moment, with_tool=True) for moment in seen]
+    return [picture(view, moment, with_tool=True, look=look) for moment in seen]
 
 
 def _sizes(seen: Sequence[Moment]) -> list[int]:
@@ -194,11 +199,11 @@ def _diagonal(moment: Moment) -> float:
     return float(np.linalg.norm(np.ptp(moment.surface.rest_positions, axis=0)))
 
 
-def picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
+def picture(view: View, moment: Moment, *, with_tool: bool, look: Look = ORGAN_LOOK) -> FloatArray:
     """Return a picture of the textured body on a white table, with the scalpel or without it."""
     surface = moment.surface
-    textured = map_texture(surface, _diagonal(moment) / TILES_PER_BODY)
-    skin, inside = texture_of(textures.skin()), texture_of(textures.cut_face())
+    textured = map_texture(surface, _diagonal(moment) / TILES_PER_BODY, look=look)
+    skin, inside = texture_of(textures.skin(look)), texture_of(textures.cut_face(look))
     objects = [SceneObject(textured.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
     if len(textured.cut.triangles):
         scattered = (0.12, 0.03, 0.03)  # without scattered light a narrow cut looks black

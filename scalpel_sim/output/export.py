@@ -8,9 +8,12 @@ turned so that y points up, as the format demands.
 - OBJ: an object for each piece, its faces in the groups `skin` and `cut`.
 - GLB: a node for each piece, with a mesh of its skin and a mesh of its cut faces.
 
-Pieces are numbered from 1, the largest at rest first, as in `summary.json`.
+Pieces are numbered from 1, the largest at rest first, as in `summary.json`. Of a body with several
+labels each face of a PLY has the colour of its label, and the property `label`; groups of an OBJ
+and meshes of a GLB are one for each label, as `skin_2_fat` and `cut_2_fat`.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,7 +21,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import UsageError, writing
-from tissue import BoolArray, FloatArray, IntArray, Surface
+from scalpel_sim.scene.label_colours import LabelColours
+from tissue import CUT_COLOUR, SKIN_COLOUR, BoolArray, FloatArray, IntArray, Surface
 from tissue.support import whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
@@ -40,8 +44,24 @@ class SurfacePiece(NamedTuple):
     """Surface of this piece alone, with vertices of its own."""
 
 
-def export_surface(surface: Surface, path: Path) -> None:
+class _Part(NamedTuple):
+    """The triangles of a piece that have one colour."""
+
+    name: str
+    """`skin` or `cut`, and the label of a body that has several."""
+    chosen: BoolArray
+    """Which triangles of the piece they are."""
+    colour: tuple[int, ...]
+    """Red, green, blue and opacity, 0 to 255 (sRGB)."""
+
+
+def export_surface(surface: Surface, path: Path, labels: Sequence[LabelColours] = ()) -> None:
     """Write a body's surface in the format that the file name's ending requests.
+
+    Args:
+        surface: The surface.
+        path: The file.
+        labels: Colours of the labels of the body, if it has several.
 
     Raises:
         UsageError: the ending is none of `ENDINGS`.
@@ -50,7 +70,7 @@ def export_surface(surface: Surface, path: Path) -> None:
     _check_suffix(path, ENDINGS, "--export")
     write = _WRITERS[path.suffix.lower()]
     with writing(path, "another --export"), whole_file(path) as unfinished:
-        unfinished.write_bytes(write(surface))
+        unfinished.write_bytes(write(surface, labels))
 
 
 def check_exports(paths: Iterable[Path]) -> None:
@@ -97,11 +117,11 @@ def surface_pieces(surface: Surface) -> list[SurfacePiece]:
         vertices, triangles = np.flatnonzero(piece == number), of_triangle == number
         place = np.empty(len(piece), dtype=np.int64)
         place[vertices] = np.arange(len(vertices))
-        own = Surface(
-            surface.positions[vertices],
-            surface.rest_positions[vertices],
-            place[surface.triangles[triangles]],
-            surface.is_cut[triangles],
+        part = surface.part(triangles)
+        own = part._replace(
+            positions=surface.positions[vertices],
+            rest_positions=surface.rest_positions[vertices],
+            triangles=place[part.triangles],
         )
         found.append(SurfacePiece(f"piece_{number + 1}", own))
     return found
@@ -148,20 +168,27 @@ def _winding_number(point: FloatArray, corners: FloatArray) -> float:
     return float(angle.sum() / (2.0 * np.pi))
 
 
-def _stl(surface: Surface) -> bytes:
+def _stl(surface: Surface, _: Sequence[LabelColours]) -> bytes:
     """Return the surface as binary STL: triangles, and nothing else."""
     return _exported(surface.to_trimesh(), "stl")
 
 
-def _ply(surface: Surface) -> bytes:
+def _ply(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
     """Return the surface as binary PLY with a colour, `is_cut` and `piece` for each face."""
     mesh = surface.to_trimesh()
     piece = piece_of_vertices(surface)[surface.triangles[:, 0]] + 1
     mesh.face_attributes["piece"] = piece.astype(np.int32)
+    if labels and surface.labels is not None:
+        mesh.face_attributes["label"] = surface.labels.astype(np.int32)
+        colours = np.zeros((len(surface.triangles), 4), np.uint8)
+        for part in _parts(surface, labels):
+            colours[part.chosen] = part.colour
+        visual: Any = mesh.visual
+        visual.face_colors = colours
     return _exported(mesh, "ply")
 
 
-def _obj(surface: Surface) -> bytes:
+def _obj(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
     """Return the surface as OBJ text.
 
     Written here, because trimesh has no groups: skin and cut faces would not share their vertices.
@@ -171,14 +198,15 @@ def _obj(surface: Surface) -> bytes:
     for name, piece in surface_pieces(surface):
         lines.append(f"o {name}")
         lines += (f"v {x!r} {y!r} {z!r}" for x, y, z in piece.positions.tolist())
-        for part, chosen in _parts(piece):
-            lines.append(f"g {name}_{part}")
-            lines += (f"f {a} {b} {c}" for a, b, c in (piece.triangles[chosen] + n_before).tolist())
+        for part in _parts(piece, labels):
+            lines.append(f"g {name}_{part.name}")
+            corners = (piece.triangles[part.chosen] + n_before).tolist()
+            lines += (f"f {a} {b} {c}" for a, b, c in corners)
         n_before += len(piece.positions)
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def _glb(surface: Surface) -> bytes:
+def _glb(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
     """Return the surface as GLB: a node for each piece, above its skin and its cut faces."""
     from trimesh import Scene
 
@@ -187,32 +215,43 @@ def _glb(surface: Surface) -> bytes:
     graph.update("body", "world", matrix=_Y_UP)
     for name, piece in surface_pieces(surface):
         graph.update(name, "body")
-        for part, chosen in _parts(piece):
+        for part in _parts(piece, labels):
             scene.add_geometry(
-                _part_mesh(piece, chosen),
-                node_name=f"{name}_{part}",
-                geom_name=f"{name}_{part}",
+                _part_mesh(piece, part),
+                node_name=f"{name}_{part.name}",
+                geom_name=f"{name}_{part.name}",
                 parent_node_name=name,
             )
     return _exported(scene, "glb")
 
 
-def _parts(piece: Surface) -> Iterator[tuple[str, BoolArray]]:
-    """Yield the name and the triangles of the parts that a piece has: skin, and cut faces."""
-    for part, chosen in (("skin", ~piece.is_cut), ("cut", piece.is_cut)):
-        if chosen.any():
-            yield part, chosen
+def _parts(piece: Surface, labels: Sequence[LabelColours]) -> Iterator[_Part]:
+    """Yield the parts that a piece has: skin and cut faces, those of each label by themselves."""
+    for name, chosen, colour in (
+        ("skin", ~piece.is_cut, SKIN_COLOUR),
+        ("cut", piece.is_cut, CUT_COLOUR),
+    ):
+        if piece.labels is None or not labels:
+            parts = [_Part(name, chosen, colour)]
+        else:
+            parts = [
+                _Part(
+                    f"{name}_{each.label}_{re.sub(r'[^A-Za-z0-9]+', '_', each.title)}",
+                    chosen & (piece.labels == each.label),
+                    (*bytes.fromhex(each.inside if name == "cut" else each.skin), colour[3]),
+                )
+                for each in labels
+            ]
+        yield from (part for part in parts if part.chosen.any())
 
 
-def _part_mesh(piece: Surface, chosen: BoolArray) -> "Trimesh":
-    """Return some triangles of a piece, all of one colour, as a mesh with a material."""
+def _part_mesh(piece: Surface, part: _Part) -> "Trimesh":
+    """Return the triangles of a part, all of one colour, as a mesh with a material."""
     from trimesh.visual import material, texture
 
-    part = piece._replace(triangles=piece.triangles[chosen], is_cut=piece.is_cut[chosen])
-    mesh = part.to_trimesh()
+    mesh = piece.part(part.chosen).to_trimesh()
     mesh.remove_unreferenced_vertices()
-    visual: Any = mesh.visual
-    colour = visual.face_colors[0] / 255.0
+    colour = np.array(part.colour) / 255.0
     colour[:3] **= _GAMMA
     pbr: Any = material.PBRMaterial
     visuals: Any = texture.TextureVisuals
@@ -237,7 +276,7 @@ def _check_suffix(path: Path, suffixes: Sequence[str], option: str) -> None:
         raise UsageError(f"{option} is {path}; its name must end in {known}")
 
 
-_WRITERS: dict[str, Callable[[Surface], bytes]] = {
+_WRITERS: dict[str, Callable[[Surface, Sequence[LabelColours]], bytes]] = {
     ".stl": _stl,
     ".obj": _obj,
     ".ply": _ply,

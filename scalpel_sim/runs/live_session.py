@@ -25,7 +25,7 @@ from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.read import SCENES
-from scalpel_sim.viewer.looks import look_of
+from scalpel_sim.viewer.looks import look_of_scene
 from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.pictures import show_run
 from scalpel_sim.viewer.viewer import Viewer
@@ -142,7 +142,7 @@ class LiveSession:
                 0.0 if scene.blade is None else scene.blade.thickness,
                 asked.is_led,
             )
-        is_led, look = asked.is_led and not is_led_by_device, look_of(scene.material)
+        is_led, look = asked.is_led and not is_led_by_device, look_of_scene(scene)
         controls = PageControls(self._commands, is_led, choices, look)
         if self._viewer is None:
             self._viewer = Viewer(

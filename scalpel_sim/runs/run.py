@@ -26,7 +26,7 @@ from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.write import relative_path, scene_text
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.kind import StrokeTable
-from scalpel_sim.viewer.looks import look_of
+from scalpel_sim.viewer.looks import look_of_scene
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
 
@@ -133,7 +133,7 @@ def perform(
             frame=simulation.frame,
             views=prepared.scene.views,
             log=log,
-            look=look_of(prepared.scene.material),
+            look=look_of_scene(prepared.scene),
         )
         run = OpenRun(prepared, outputs, replay, settings, hand)
         # Of a tissue elsewhere nobody says how it is held or solved.

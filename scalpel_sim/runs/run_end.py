@@ -24,6 +24,7 @@ from scalpel_sim.runs.file_names import (
 )
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.scene.label_colours import colours_of_scene
 from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.pictures import add_to
@@ -128,7 +129,8 @@ def write_end(run: OpenRun) -> Summary:
         outputs.write_replay(run.replay)
     for path in run.prepared.exports:
         with attempts.of(str(path)):
-            export_surface(simulation.link.surface(), path)
+            labels = colours_of_scene(run.prepared.scene)
+            export_surface(simulation.link.surface(), path, labels)
     with attempts.of(PLOT):
         outputs.finish_plots()
     return summary

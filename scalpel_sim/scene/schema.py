@@ -16,6 +16,7 @@ from scalpel_sim.tables.values import (
     Finite,
     FourNumbers,
     Gravity,
+    HexColour,
     Label,
     LabelNumber,
     LawName,
@@ -126,6 +127,9 @@ class LabelTable(TomlTable, kw_only=True, frozen=True):
     material: PresetMaterialTable | None = None
     """Material: a preset, with figures that replace its own; or figures that replace those of
     `[material]`."""
+    colour: HexColour | None = None
+    """Colour on pages, in figures and in exported files, "#rrggbb"; without, that of the tissue
+    which the name or the material says."""
     spare: TrueOrFalse = False
     """Whether the blade is to leave it whole: a run that cuts it says so."""
 

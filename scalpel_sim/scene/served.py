@@ -36,7 +36,8 @@ def scene_of(link: TissueLink, scene: Scene | None = None) -> Scene:
     if known is not None:
         return changed(known, material=body.material, views=views)
     rest = link.snapshot()
-    mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra)
+    labels = rest.labels if rest.labels.any() else None
+    mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra, labels, dict(body.labels))
     about = f"the body '{body.scene}'"
     found = Scene(name=body.scene, about=about, body=GivenBody(source=lambda: mesh), views=views)
     return changed(found, material=body.material)

@@ -59,6 +59,9 @@ Label = Annotated[
         description="a name of one line, of 1 to 40 characters",
     ),
 ]
+HexColour = Annotated[
+    str, Meta(pattern=r"^#[0-9A-Fa-f]{6}\Z", description='a colour, "#rrggbb", as "#b3202a"')
+]
 Text = Annotated[str, Meta(min_length=1, description="text")]
 FileName = Annotated[str, Meta(min_length=1, description="text", extra={"is_file": True})]
 TrueOrFalse = Annotated[bool, Meta(description="true or false")]

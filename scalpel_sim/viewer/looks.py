@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from scalpel_sim.scene.label_colours import LabelColours, colours_of_scene
+from scalpel_sim.scene.scene import Scene
 from tissue import MATERIALS, Material
 
 Ramp = tuple[tuple[float, str], ...]
@@ -28,6 +30,8 @@ class Look(NamedTuple):
     """Share of the light that goes through, where a graphics card draws."""
     glow: int = 0x3A0A0E
     """Light scattered between the faces of a cut, 0xRRGGBB. Without it a narrow cut looks black."""
+    labels: tuple[LabelColours, ...] = ()
+    """Of a body with several labels the colours of each, which its pale ramps are factors of."""
 
 
 ORGAN_LOOK = Look(
@@ -36,6 +40,14 @@ ORGAN_LOOK = Look(
 )
 """A soft organ, from deep vessels to its thin capsule, and from the blood between fibres to bare
 fibres: the look of all materials but those below."""
+
+PALE: Ramp = ((0.0, "6e6462"), (0.3, "b9b1ae"), (0.55, "e6e2e0"), (0.8, "f4f2f1"), (1.0, "ffffff"))
+"""Ramp of a texture whose colour comes from labels. Its middle is bright: it is a factor."""
+
+LABELLED_LOOK = Look(
+    skin=PALE, inside=PALE, vessels=0.3, fibres=0.7, rim=0.12, variation=0.5, glow=0x20120E
+)
+"""A body of several labels, before it has their colours."""
 
 LOOKS = {
     "liver": Look(
@@ -97,6 +109,12 @@ LOOKS = {
     ),
 }
 """Looks of materials by their names in `tissue.MATERIALS`."""
+
+
+def look_of_scene(scene: Scene) -> Look:
+    """Return the look of a scene's body: of its material, or of its labels, if it has several."""
+    labels = colours_of_scene(scene)
+    return LABELLED_LOOK._replace(labels=labels) if labels else look_of(scene.material)
 
 
 def look_of(material: Material) -> Look:

@@ -30,9 +30,10 @@ BYTES_PER_TRIANGLE = 55
 """Size of one triangle in the file, compressed and in base64 [bytes]. Measured: 38 to 50 on cut
 blocks and organs. Only the number of frames that are kept depends on it."""
 
+_COLOURS = "Red-brown: skin. Bright red: faces of the cut. "
 _CAPTION = (
-    "Red-brown: skin. Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact "
-    "forces, magnified thirty times. Drag to turn the view, scroll to zoom."
+    "Arrow: force on the blade. Blue lines: contact forces, magnified thirty times. Drag to turn "
+    "the view, scroll to zoom."
 )
 """Text below the heading of a replay."""
 
@@ -146,7 +147,8 @@ class ReplayWriter:
         """
         if not (self._frames or self._last):
             raise ValueError("the replay has no frames: add at least one before writing it")
-        head, tail = replay_page(self._title, _CAPTION, _PLACE).split(_PLACE)
+        caption = ("" if self._look.labels else _COLOURS) + _CAPTION
+        head, tail = replay_page(self._title, caption, _PLACE).split(_PLACE)
         with path.open("w", encoding="utf-8") as file:
             file.write(head)
             for i, element in enumerate(self._elements()):

@@ -21,6 +21,7 @@ import numpy as np
 from scalpel_sim.hands.run_controls import RunResults
 from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.recording.recording import TERMS
+from scalpel_sim.scene.label_colours import LabelColours
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
@@ -222,6 +223,14 @@ class Scene3D:
             for v in views
         ]
         self._add("set_cameras", cameras=cameras, extent=extent)
+
+    def set_legend(self, labels: Sequence[LabelColours]) -> None:
+        """Show which label has which colours; no labels: the body has one material."""
+        entries = [
+            {"title": each.title, "skin": f"#{each.skin}", "inside": f"#{each.inside}"}
+            for each in labels
+        ]
+        self._add("set_legend", entries=entries)
 
     def set_wireframe(self, is_on: bool) -> None:
         """Switch the wireframe on or off: the edges of the tissue's triangles."""

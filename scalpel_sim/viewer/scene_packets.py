@@ -141,6 +141,7 @@ class ScenePackets:
             eye = own_eye(self._shapes, body_poses, surface.positions, self._frame)
             cameras.append(ViewTable(name=OWN_VIEW, eye=eye.tolist(), target=centre.tolist()))
         scene.set_cameras(cameras, self._diagonal)
+        scene.set_legend(self._look.labels)
         scene.set_wireframe(self._wireframe)
         return scene.take()
 

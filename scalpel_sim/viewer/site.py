@@ -12,10 +12,8 @@ from scalpel_sim.viewer.leading import Leadership
 from scalpel_sim.viewer.messages import ViewerSettings
 from scalpel_sim.viewer.page import PAGE_HEADERS, live_page, policy_of
 
-_CAPTION = (
-    "Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact forces, "
-    "magnified thirty times. "
-)
+_COLOURS = "Bright red: faces of the cut. "
+_CAPTION = "Arrow: force on the blade. Blue lines: contact forces, magnified thirty times. "
 _HOW_TO_LOOK = "Drag to turn the view, scroll to zoom."
 _HOW_TO_LEAD = "Drag with the right button to turn the view."
 """Text below the heading of the live page."""
@@ -56,7 +54,7 @@ class Site:
         how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
         self.document = live_page(
             settings.title,
-            _CAPTION + how,
+            ("" if settings.look.labels else _COLOURS) + _CAPTION + how,
             self._token,
             is_led=settings.is_led,
             choices=settings.choices,

@@ -12,7 +12,7 @@ without charts hides the seams between them.
 
 import functools
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -176,12 +176,17 @@ def map_texture(
         surface: Boundary triangles of the body.
         tile: Length of the material that one repeat of the texture covers [m].
         levels: Quantities at the vertices of the surface, see `TriangleMesh.levels`.
-        look: Look of its material.
+        look: Look of its material, or of its labels.
     """
     skin, cut = (
         _textured_triangles(surface, surface.triangles[chosen], tile, levels, look.variation)
         for chosen in (~surface.is_cut, surface.is_cut)
     )
+    if look.labels and surface.labels is not None:
+        place = np.searchsorted([each.label for each in look.labels], surface.labels)
+        outside, inside = factors_of_labels(look)
+        skin = _in_colours(skin, place[~surface.is_cut], outside)
+        cut = _in_colours(cut, place[surface.is_cut], inside)
     if cut.tints is not None:
         of_skin = np.zeros(len(surface.positions), dtype=bool)
         of_skin[surface.triangles[~surface.is_cut]] = True
@@ -190,6 +195,58 @@ def map_texture(
         shades = np.where(is_dark, 1.0 - abs(look.rim), 1.0)
         cut = cut._replace(tints=cut.tints * shades[:, None])
     return TexturedSurface(skin, cut)
+
+
+@functools.cache
+def factors_of_labels(look: Look) -> tuple[FloatArray, FloatArray]:
+    """Return the tints that give a labelled texture the colours of its labels, outside and inside.
+
+    Linear light, shape (n_labels, 3) each. Where a colour is brighter than the middle of the
+    texture, the brightest channel is 1 and the hue stays.
+    """
+    names = [each.skin for each in look.labels], [each.inside for each in look.labels]
+    outside, inside = (
+        _linear(colours) / _linear([_at(ramp, 0.5)])
+        for colours, ramp in zip(names, (look.skin, look.inside), strict=True)
+    )
+    return tuple(
+        each / np.maximum(each.max(axis=1, keepdims=True), 1.0) for each in (outside, inside)
+    )
+
+
+def _at(ramp: Ramp, position: float) -> str:
+    """Return the colour of a ramp at a position on it."""
+    knots = [knot for knot, _ in ramp]
+    colours = np.array([list(bytes.fromhex(colour)) for _, colour in ramp], dtype=float)
+    return bytes(round(np.interp(position, knots, channel)) for channel in colours.T).hex()
+
+
+def _linear(colours: Sequence[str]) -> FloatArray:
+    """Return colours in sRGB as linear light, shape (n, 3)."""
+    shares = np.array([list(bytes.fromhex(colour)) for colour in colours]) / 255.0
+    return np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+
+
+def _in_colours(mesh: TriangleMesh, place: IntArray, tints: FloatArray) -> TriangleMesh:
+    """Return a mesh in colours of its triangles: a vertex where they meet is there once for each.
+
+    Args:
+        mesh: The mesh, which has tints.
+        place: Place of the colour of each triangle in `tints`, shape (n_triangles,).
+        tints: Factors of the tints of the mesh, shape (n, 3).
+    """
+    n = len(tints)
+    keys, triangles = _unique(n * mesh.triangles + place[:, None], n * len(mesh.positions))
+    vertex, colour = keys // n, keys % n
+    assert mesh.uv is not None and mesh.tints is not None
+    return TriangleMesh(
+        positions=mesh.positions[vertex],
+        triangles=triangles,
+        normals=mesh.normals[vertex],
+        uv=mesh.uv[vertex],
+        tints=mesh.tints[vertex] * tints[colour],
+        levels={name: values[vertex] for name, values in mesh.levels.items()},
+    )
 
 
 def _nodes_of(triangles: IntArray, corners: IntArray) -> IntArray:

@@ -137,7 +137,7 @@ def test_a_tissue_refuses_to_be_copied_and_says_what_to_do(tissue, copied):
 
 
 def test_a_snapshot_is_a_copy(tissue):
-    for array in (*tissue.snapshot(), *tissue.surface()):
+    for array in (*tissue.snapshot(), *tissue.surface()[:4]):
         array[...] = 0
     np.testing.assert_array_equal(tissue.snapshot().positions, MESH.positions)
     assert tissue.n_tetrahedra == 48

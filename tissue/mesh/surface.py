@@ -10,6 +10,7 @@ from tissue.core.vec3 import vec3
 from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
 from tissue.mesh.body import CUT, Body, is_open
 from tissue.mesh.faces import OUTWARD
+from tissue.mesh.nonconforming import HANGING
 from tissue.types import Surface
 
 
@@ -39,7 +40,18 @@ def boundary_surface(body: Body) -> Surface:
     used = _used_by(triangles, body)
     nodes = np.flatnonzero(used)
     vertex = np.cumsum(used) - 1
-    return Surface(body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut)
+    labels = _labels_of_boundary(body)
+    return Surface(body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut, labels)
+
+
+def _labels_of_boundary(body: Body) -> IntArray | None:
+    """Return the label of each triangle of `boundary_triangles`; None of a body with one label."""
+    label = body.materials.label
+    if (label == label[0]).all():
+        return None
+    links = body.links[: body.n_tetrahedra]
+    tetrahedra = np.nonzero((links > HANGING) & (links < 0))[0]
+    return np.asarray(label[body.material[tetrahedra]])
 
 
 def boundary_nodes(body: Body) -> IntArray:

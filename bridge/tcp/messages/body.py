@@ -32,9 +32,9 @@ LARGEST_CHUNKS = LARGEST_FRAME
 a second."""
 
 _NODE_BYTES = 3 * 8 + 3 * 8 + 3 * 8 + 8 + 8 + 1
-_TETRAHEDRON_BYTES = 4 * 8
+_TETRAHEDRON_BYTES = 4 * 8 + 8
 _VERTEX_BYTES = 3 * 8 + 3 * 8
-_TRIANGLE_BYTES = 3 * 8 + 1
+_TRIANGLE_BYTES = 3 * 8 + 1 + 8
 
 _Natural = Annotated[float, msgspec.Meta(ge=0.0)]
 """A float that is not negative; infinity is the time step of a body that cannot move."""
@@ -129,6 +129,7 @@ SURFACE: Message[Surface] = Message(
         rest_positions=("vertices", 3),
         triangles=("triangles", 3),
         is_cut=("triangles",),
+        labels=("triangles",),
     ),
     "the surface",
     _check_surface,

@@ -1,12 +1,13 @@
 """The description of the tissue, names of scenes in it, and errors."""
 
 import re
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import msgspec
 import numpy as np
 
-from bridge.link import SceneView, TissueDescription
+from bridge.link import NamedLabel, SceneView, TissueDescription
 from bridge.tcp.messages.encoding import Count, FiniteFloat, Many, Message, Part, Record
 from bridge.tcp.wire import MessageError
 from tissue import Material
@@ -14,11 +15,18 @@ from tissue import Material
 LARGEST_ERROR = 1 << 16
 """Largest error [byte]: text for a person to read."""
 
-LARGEST_DESCRIPTION = 1 << 18
-"""Largest description [byte]: a name, a dozen numbers, and the views, of some 300 bytes each."""
+LARGEST_DESCRIPTION = 1 << 19
+"""Largest description [byte]: a name, a dozen numbers, the views, of some 300 bytes each, and the
+names of labels, of up to 400."""
 
 MAX_VIEWS = 256
 """Largest number of views of a scene: more than anyone searches in a list."""
+
+MAX_LABELS = 1024
+"""Largest number of labels with names that are sent: more than a person tells apart."""
+
+LONGEST_LABEL = 100
+"""Longest name of a label that is sent [characters]."""
 
 _LONGEST_NAME = 64
 _UNNAMED = "tissue"
@@ -33,6 +41,18 @@ SentSceneName = Annotated[str, msgspec.Meta(pattern=rf"^[A-Za-z0-9_-]{{1,{_LONGE
 def sent_scene_name(name: str) -> str:
     """Return a name as another process gets it: what may not be in one is an underscore there."""
     return re.sub(r"[^A-Za-z0-9_-]", "_", name)[:_LONGEST_NAME] or _UNNAMED
+
+
+def sent_labels(labels: Sequence[NamedLabel]) -> tuple[NamedLabel, ...]:
+    """Return names of labels as another process gets them: short and printable."""
+    return tuple(
+        label._replace(name=_printable(label.name[:LONGEST_LABEL])) for label in labels[:MAX_LABELS]
+    )
+
+
+def _printable(text: str) -> str:
+    """Return a text without control characters."""
+    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
 
 
 def pack_error(message: str) -> bytes:
@@ -52,7 +72,7 @@ def unpack_error(payload: bytes) -> str:
         text = payload.decode("utf-8")
     except UnicodeDecodeError as error:
         raise MessageError(f"an error that cannot be read: {error}") from error
-    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
+    return _printable(text)
 
 
 def _check_description(description: TissueDescription) -> None:
@@ -63,6 +83,8 @@ def _check_description(description: TissueDescription) -> None:
         )
     if not all(view.name.isprintable() for view in description.views):
         raise MessageError("a view of the scene has a control character in its name")
+    if not all(label.name.isprintable() for label in description.labels):
+        raise MessageError("a label of the body has a control character in its name")
 
 
 class _Material(Part):
@@ -110,6 +132,12 @@ DESCRIPTION: Message[TissueDescription] = Message(
                 fov_degrees=Annotated[float, msgspec.Meta(gt=0.0, lt=180.0)],
             ),
             MAX_VIEWS,
+        ),
+        labels=Many(
+            Record(
+                NamedLabel, label=Count, name=Annotated[str, msgspec.Meta(max_length=LONGEST_LABEL)]
+            ),
+            MAX_LABELS,
         ),
     ),
     "the tissue's description",

@@ -30,6 +30,7 @@ function scaleTexts(colours) {
 }
 
 function showScale(colours) {
+    hideLegend(colours);
     element("scale").hidden = colours.quantity === "";
     if (colours.quantity === "") return;
     const { title, ticks } = scaleTexts(colours);
@@ -42,6 +43,25 @@ function showScale(colours) {
     }));
 }
 
+// The colours of labels, outside and inside.
+let legend = [];
+
+function showLegend(entries) {
+    legend = entries;
+    element("legend").replaceChildren(...entries.map(({ title, skin, inside }) => {
+        const [item, colour] = [document.createElement("li"), document.createElement("span")];
+        colour.style.background = `linear-gradient(to right, ${skin} 50%, ${inside} 50%)`;
+        item.append(colour, title);
+        return item;
+    }));
+    hideLegend(sceneView.colours);
+}
+
+// Values that are shown win over labels.
+function hideLegend(colours) {
+    element("legend").hidden = legend.length === 0 || colours.isThere;
+}
+
 // The colours of the scale in equal steps, as CSS has them.
 function gradient() {
     return Array.from({ length: 17 }, (_, i) =>
@@ -49,6 +69,7 @@ function gradient() {
 }
 
 sceneView.onScale = showScale;
+sceneView.onLegend = showLegend;
 element("scale-bar").style.background = `linear-gradient(to right, ${gradient().join(", ")})`;
 
 // A list that was opened by a pointer gives the keys back once something is chosen. By keys one may continue.

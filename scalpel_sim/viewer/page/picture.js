@@ -1,4 +1,4 @@
-// Saves what the page shows as a PNG: the scene, its heading, the readings and the scale of colours.
+// Saves what the page shows as a PNG: the scene, its heading, the readings, and the scale or the legend of colours.
 "use strict";
 
 const MARGIN = 24, LINE = 22; // [CSS pixels]
@@ -29,6 +29,7 @@ function drawPicture() {
     const rows = shownReadings();
     if (rows.length > 0) drawTexts(context, MARGIN, height - 2 * MARGIN - LINE * rows.length, rows);
     if (sceneView.colours.isThere) drawScale(context, width, height);
+    else if (!element("legend").hidden) drawLegend(context, width, height);
     return canvas;
 }
 
@@ -48,6 +49,24 @@ function drawScale(context, width, height) {
         const part = i / (ticks.length - 1); // the first begins at the left end, the last ends at the right
         const at = x + 12 + part * (length - context.measureText(tick).width);
         context.fillText(tick, at, y + 24 + 1.5 * LINE);
+    });
+}
+
+// The colours of labels, in the same corner.
+function drawLegend(context, width, height) {
+    const widest = Math.max(...legend.map(({ title }) => context.measureText(title).width));
+    const boxWidth = widest + 54, boxHeight = LINE * legend.length + 12;
+    const x = width - MARGIN - boxWidth, y = height - MARGIN - boxHeight;
+    context.fillStyle = BOX_COLOUR;
+    context.fillRect(x, y, boxWidth, boxHeight);
+    legend.forEach(({ title, skin, inside }, i) => {
+        const middle = y + 6 + LINE * (i + 0.5);
+        [skin, inside].forEach((colour, side) => {
+            context.fillStyle = colour;
+            context.fillRect(x + 12 + 10 * side, middle - 7, 10, 14);
+        });
+        context.fillStyle = TEXT_COLOUR;
+        context.fillText(title, x + 42, middle);
     });
 }
 

@@ -35,6 +35,7 @@ class SceneView {
         this.isSmooth = true; // whether the skin is drawn by it
         this.colours = new FieldColours();
         this.onScale = () => {};
+        this.onLegend = () => {};
         this.wireframe = false;
         this.shown = "faces"; // or "grid", or "cut": see setShown
         this.showsContacts = true;
@@ -46,6 +47,7 @@ class SceneView {
             set_object: (command) => this.setObject(command) || meshcatHandles(command),
             set_cameras: (command) => this.setCameras(command),
             set_wireframe: (command) => this.setWireframe(command.on),
+            set_legend: (command) => this.onLegend(command.entries),
             set_scales: (command) => this.setScales(command.tops),
             set_readings: (command) => this.setReadings(command),
             set_hand: (command) => this.onHand(command),

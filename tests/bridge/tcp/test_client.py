@@ -119,7 +119,7 @@ def test_what_the_tissue_refuses_is_a_refused_request(link, upright):
         (bytes(100), "is not scalpel-sim"),
         (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
-        (HELLO[:4] + b"\x09\x00" + HELLO[6:], "uses version 9 of the protocol and this one 10"),
+        (HELLO[:4] + b"\x0a\x00" + HELLO[6:], "uses version 10 of the protocol and this one 11"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
         (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],

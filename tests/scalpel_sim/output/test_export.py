@@ -10,6 +10,7 @@ import trimesh
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import ENDINGS, export_surface, surface_pieces
+from scalpel_sim.scene.label_colours import LabelColours
 from tests.support import strokes
 from tissue import Material, Surface, TetrahedralMesh, Tissue, block, liver_lobe
 from tissue.mesh.pieces import piece_of_tetrahedra
@@ -75,6 +76,11 @@ def exported(body: Body, folder: Path, ending: str) -> trimesh.Trimesh:
     """Write a body and read it again, as one mesh whose parts share their vertices."""
     path = folder / f"body{ending}"
     export_surface(body.surface, path)
+    return exported_mesh(path)
+
+
+def exported_mesh(path: Path) -> trimesh.Trimesh:
+    """Read a file as one mesh whose parts share their vertices."""
     read = trimesh.load(path)
     if isinstance(read, trimesh.Scene):
         read = read.to_geometry()
@@ -231,3 +237,54 @@ def test_a_file_that_cannot_be_exported_to_is_refused_before_the_run(
     assert run("--out", str(tmp_path / "out"), "--export", str(tmp_path / name)) == 2
     assert expected in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+LABELS = (
+    LabelColours(0, "the rest", "a23a34", "b03a34"),
+    LabelColours(3, "fat", "e6c46c", "f0c000"),
+)
+
+
+def labelled_surface() -> Surface:
+    """Return the surface of a block of two labels, with a cut through both of them."""
+    middles = BLOCK.positions[BLOCK.tetrahedra].mean(axis=1)
+    mesh = BLOCK._replace(labels=np.where(middles[:, 1] < 0.01, 0, 3))
+    tissue = Tissue(mesh, Material(toughness=0.5), fixed=BLOCK.positions[:, 0] <= 0.005)
+    strokes.make(tissue, strokes.straight(BLOCK, 0.75))
+    return tissue.surface()
+
+
+def test_faces_of_a_ply_have_the_label_and_its_colour(tmp_path):
+    surface = labelled_surface()
+    export_surface(surface, tmp_path / "two.ply", LABELS)
+    read = trimesh.load(tmp_path / "two.ply")
+    data = read.metadata["_ply_raw"]["face"]["data"]
+    assert np.array_equal(data["label"].ravel(), surface.labels)
+    for label, is_cut, colour in (
+        (0, False, [0xA2, 0x3A, 0x34]),
+        (3, False, [0xE6, 0xC4, 0x6C]),
+        (3, True, [0xF0, 0xC0, 0x00]),
+    ):
+        chosen = (surface.labels == label) & (surface.is_cut == is_cut)
+        assert chosen.any() and (read.visual.face_colors[chosen][:, :3] == colour).all()
+
+
+@pytest.mark.parametrize("ending", [".obj", ".glb"])
+def test_groups_of_an_obj_and_meshes_of_a_glb_are_one_for_each_label(ending, tmp_path):
+    surface, path = labelled_surface(), tmp_path / f"two{ending}"
+    export_surface(surface, path, LABELS)
+    names = [
+        f"piece_{piece}_{part}_{label}"
+        for piece in (1, 2)
+        for part in ("skin", "cut")
+        for label in ("0_the_rest", "3_fat")
+    ]
+    if ending == ".obj":
+        found = [line[2:] for line in path.read_text().splitlines() if line.startswith("g ")]
+        assert found == names
+    else:
+        scene = trimesh.load(path)
+        assert sorted(scene.geometry) == sorted(names)
+        fat = scene.geometry["piece_1_cut_3_fat"].visual.material.baseColorFactor
+        np.testing.assert_allclose(fat[:3] / 255.0, [0.875, 0.536, 0.0], atol=0.01)
+    assert_is_closed(exported_mesh(path))

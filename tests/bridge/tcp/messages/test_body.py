@@ -53,6 +53,7 @@ REPORT = CutReport(
     [
         (SNAPSHOT, TETRAHEDRON, snapshot_bytes(4, 1)),
         (SURFACE, SKIN, surface_bytes(1)),
+        (SURFACE, SKIN._replace(labels=np.array([3, 0])), surface_bytes(1)),
         (CHUNKS, BOXES, MAP_BYTES),
         (CHUNKS, Chunks(BOXES.boxes[:0], 0.25), MAP_BYTES),
         (CUT_REPORT, REPORT, MAP_BYTES),

@@ -5,13 +5,16 @@ import numpy as np
 import pytest
 
 from bridge.device.messages import DEVICE_DESCRIPTION, DeviceDescription
-from bridge.link import SceneView, TissueDescription
+from bridge.link import NamedLabel, SceneView, TissueDescription
 from bridge.tcp.messages.text import (
     DESCRIPTION,
     LARGEST_DESCRIPTION,
     LARGEST_ERROR,
+    LONGEST_LABEL,
+    MAX_LABELS,
     MAX_VIEWS,
     pack_error,
+    sent_labels,
     sent_scene_name,
     unpack_error,
 )
@@ -51,10 +54,23 @@ def test_a_description_arrives_with_every_property_of_material_and_blade():
         BladeShape(thickness=3e-4),
         -0.01,
         (VIEW, VIEW._replace(name="µ", eye=(-0.0, 1.0 / 3.0, 1e-300))),
+        (NamedLabel(0, "fat"), NamedLabel(7, "Gefäß")),
     )
     received = DESCRIPTION.unpack(DESCRIPTION.pack(sent))
     assert bits(received.bounds) == bits(sent.bounds)
     assert received._replace(bounds=None) == sent._replace(bounds=None)
+
+
+def test_names_of_labels_are_sent_short_and_printable_and_not_too_many():
+    many = [NamedLabel(i, "\u00e9" * 500) for i in range(5000)]
+    sent = sent_labels([NamedLabel(3, "a\x1b[2J"), *many])
+    assert sent[0] == NamedLabel(3, "a\ufffd[2J")
+    assert len(sent) == MAX_LABELS and len(sent[1].name) == LONGEST_LABEL
+    views = [VIEW._replace(name="\u00e9" * 100)] * MAX_VIEWS
+    description = TissueDescription("organ", Material(), BOUNDS, 1, 4, None, None, views, sent)
+    payload = DESCRIPTION.pack(description)
+    assert len(payload) <= LARGEST_DESCRIPTION
+    assert DESCRIPTION.unpack(payload).labels == sent
 
 
 def described(*views, scene="organ"):
