@@ -23,10 +23,9 @@ from scalpel_sim.tables.problems import alternatives, table_of
 SceneName = Annotated[
     str | None,
     Parameter(
-        help="organ (default), incision, retract, excise, taut_incision, layers, tumour, a "
-        "specimen of a material (liver, kidney, skin, fat, muscle, gelatin, silicone), slab, grid2 "
-        "or grid7; or a "
-        "FILE.toml, which the command `new` writes."
+        help="organ (default), incision, retract, excise, taut_incision, layers, tumour, "
+        "gallbladder, a specimen of a material (liver, kidney, skin, fat, muscle, gelatin, "
+        "silicone), slab, grid2 or grid7; or a FILE.toml, which the command `new` writes."
     ),
 ]
 

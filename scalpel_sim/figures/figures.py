@@ -75,7 +75,12 @@ _ORGAN_MOMENTS = (0.5, 0.72)
 """Shares of the stroke: half way, and shortly before the organ falls in two."""
 _ORGAN_COLOURS = 256
 """Colours of the file, which is then less than half as large."""
-TWO_HANDS = {"retract": (3.6, 4.2), "excise": (1.75, 3.3), "taut_incision": (2.4, 3.2)}
+TWO_HANDS = {
+    "retract": (3.6, 4.2),
+    "excise": (1.75, 3.3),
+    "taut_incision": (2.4, 3.2),
+    "gallbladder": (2.0, 3.2),
+}
 """Scenes that have such a picture, and its moments [s]: as the blade cuts, and when the left hand
 has what came off; or as the blade is in, and when it is out."""
 

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
+from scalpel_sim.meshing.gallbladder import gallbladder
 from scalpel_sim.tables.values import (
     CellCounts,
     CellSizes,
@@ -22,7 +23,8 @@ from scalpel_sim.tables.values import (
 )
 from tissue import TetrahedralMesh
 
-BodyShape = Literal["organ", "block", "lattice", "graded", "cylinder", "mesh"]
+BodyShape = Literal["organ", "gallbladder", "block", "lattice", "graded", "cylinder", "mesh"]
+_SHAPES: tuple[BodyShape, ...] = get_args(BodyShape)
 
 USUAL_FIXED, USUAL_STRETCH = "left,right", 0.05
 """Sides that are held where a scene says nothing else, and how far they are pulled apart."""
@@ -33,6 +35,7 @@ _RINGS = 5
 
 KEYS_OF_SHAPE = {
     "organ": Kind(),
+    "gallbladder": Kind(),
     "block": Kind(needed=("size", "cells")),
     "lattice": Kind(needed=("size", "cells")),
     "graded": Kind(needed=("along_x", "along_y", "along_z")),
@@ -45,8 +48,9 @@ KEYS_OF_SHAPE = {
 class BodyTable(TomlTable, kw_only=True, frozen=True, dict=True):
     """`[body]`: the geometry. Its keys depend on the shape."""
 
-    shape: Annotated[BodyShape, one_of("organ", "block", "lattice", "graded", "cylinder", "mesh")]
-    """`"organ"`, a liver lobe of 5,136 tetrahedra; `"block"`; `"lattice"`, a block with a node in
+    shape: Annotated[BodyShape, one_of(*_SHAPES)]
+    """`"organ"`, a liver lobe of 5,136 tetrahedra; `"gallbladder"`, one on its bed of liver, with
+    fat and artery as labels, 4,819 tetrahedra; `"block"`; `"lattice"`, a block with a node in
     each cell too, for what is bent ([materials](materials.md#the-laws)); `"graded"`, a block of
     cells of different sizes; `"cylinder"`; or `"mesh"`, a file."""
     size: Size | None = None
@@ -123,6 +127,8 @@ def _mesh_of(body: BodyTable) -> TetrahedralMesh:
     match body.shape:
         case "organ":
             return tissue.liver_lobe()
+        case "gallbladder":
+            return gallbladder()
         case "graded":
             return _graded_block(body)
         case "cylinder":

@@ -35,6 +35,7 @@ SHIPPED_SCENES = (
     "taut_incision",
     "layers",
     "tumour",
+    "gallbladder",
     "liver",
     "kidney",
     "skin",

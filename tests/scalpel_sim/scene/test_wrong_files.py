@@ -61,7 +61,7 @@ WRONG = {
     "an unknown key": ("gravity", "gravty", "key of [world] is called 'gravty'. Did you mean"),
     "a key in the wrong table": ("gravity = 9.81", "toughness = 5", "which belongs to [material]"),
     "a key in no table": ("about", "toughness = 5\nabout", "stands in no table; write [material]"),
-    "an unknown shape": ('"block"\nsize', '"blok"\nsize', 'must be "organ" or "block" or'),
+    "an unknown shape": ('"block"\nsize', '"blok"\nsize', 'must be "organ" or "gallbladder" or'),
     "a block with a radius": ("cells =", "radius = 0.1\ncells =", 'belongs to shape "cylinder"'),
     "a flat body": ("0.04, 0.04, 0.04", "0.04, 0.04, 0.0", "three numbers above 0"),
     "an unknown side": ('"left,right"', '"left,rigth"', "rigth"),
