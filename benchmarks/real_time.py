@@ -13,8 +13,9 @@ from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.runs.run import run_time
 from scalpel_sim.scene.checks import moves_together
+from scalpel_sim.scene.materials import material_called
 from scalpel_sim.scene.read import scene_called
-from scalpel_sim.scene.scene import Scene, changed, material_called
+from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.validate.speed.measurements import (
     COUNTED,

@@ -58,6 +58,8 @@ from .material_presets import MATERIALS as MATERIALS
 from .material_presets import Preset as Preset
 from .material_presets import SourcedValue as SourcedValue
 from .mesh.faces import boundary_faces as boundary_faces
+from .mesh.joined import joined as joined
+from .mesh.joined import placed as placed
 from .mesh.mesh_arrays import MeshError as MeshError
 from .mesh.pieces import piece_of_tetrahedra as piece_of_tetrahedra
 from .mesh.pieces import pieces_of as pieces_of
@@ -172,11 +174,13 @@ __all__ = [
     "cylinder",
     "expect_toughness_in_range",
     "fixed_nodes",
+    "joined",
     "lattice_block",
     "liver_lobe",
     "mesh_from_arrays",
     "piece_of_tetrahedra",
     "pieces_of",
+    "placed",
     "read_mesh",
     "report_on_mesh",
     "spring_error",

@@ -1,5 +1,6 @@
 """The materials of a body from those of its labels, checked, and their changes between episodes."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy.typing as npt
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.material import Material
 from tissue.mesh.material_table import SCALED, MaterialArrays
+from tissue.mesh.parts import MOST_NAMED, described_label, labels_of_part
 from tissue.types import TetrahedralMesh
 
 ALIKE = ("viscous_damping", "prony")
@@ -18,11 +20,9 @@ SPRINGS_ALIKE = ("retardation_time",)
 """Quantities that they share, besides, where springs carry the shear: dampers have the stiffness of
 springs."""
 
-MOST_NAMED = 20
-"""Labels that an error names at most."""
-
 LabelKey = int | str | None
-"""A label by its number, or by its name in the file of the mesh; None: all that are not given."""
+"""A label by its number, or by its name in the file of the mesh; a body, by its name, with all its
+labels; None: all that are not given."""
 
 
 class BodyMaterials(NamedTuple):
@@ -80,9 +80,9 @@ def _of_labels(
     if isinstance(material, Material):
         return dict.fromkeys(present, material)
     given = {
-        number_of_label(present, names, label): each
-        for label, each in material.items()
-        if label is not None
+        number: each
+        for label, each in _of_bodies_first(material)
+        for number in labels_of_part(present, names, label)
     }
     rest = material.get(None)
     lacking = [described_label(names, label) for label in present if label not in given]
@@ -94,33 +94,12 @@ def _of_labels(
     return {label: given[label] if label in given else rest or Material() for label in present}
 
 
-def number_of_label(present: Sequence[int], names: Mapping[int, str], label: int | str) -> int:
-    """Return the number of a label.
-
-    Args:
-        present: The labels that there are.
-        names: Their names, of those that have one.
-        label: The label, by number or name.
-
-    Raises:
-        ValueError: no tetrahedron has it.
-    """
-    if isinstance(label, str):
-        numbers = [number for number, name in names.items() if name == label]
-    else:
-        numbers = [int(label)]
-    if len(numbers) == 1 and numbers[0] in present:
-        return numbers[0]
-    known = ", ".join(described_label(names, number) for number in present[:MOST_NAMED])
-    raise ValueError(
-        f"no tetrahedron has label {label!r}; there is {known}. Labels are those of the mesh: "
-        "`labels`, or groups and cell data of its file"
-    )
-
-
-def described_label(names: Mapping[int, str], label: int) -> str:
-    """Return a label with its name, if it has one."""
-    return f"{label} ('{names[label]}')" if label in names else f"{label}"
+def _of_bodies_first(
+    material: Mapping[LabelKey, Material],
+) -> list[tuple[int | str, Material]]:
+    """Return the labels that materials are given for: `body` before `body/label`, numbers last."""
+    found = [(label, each) for label, each in material.items() if label is not None]
+    return sorted(found, key=lambda pair: len(pair[0]) if isinstance(pair[0], str) else math.inf)
 
 
 def chosen(
@@ -145,7 +124,7 @@ def chosen(
     if isinstance(where, (int, np.integer, str)) and not isinstance(where, bool):
         present = np.unique(table.label[rows]).tolist()
         label = where if isinstance(where, str) else int(where)
-        return np.asarray(table.label[rows] == number_of_label(present, names, label))
+        return np.isin(table.label[rows], labels_of_part(present, names, label))
     mask = np.asarray(where)
     if mask.shape != rows.shape or mask.dtype != np.bool_:
         raise ValueError(

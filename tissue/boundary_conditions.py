@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.mesh.faces import boundary_faces
 from tissue.mesh.mesh_arrays import mesh_arrays
+from tissue.mesh.parts import part_of_mesh
 from tissue.types import TetrahedralMesh
 
 SIDES = {
@@ -63,7 +64,9 @@ _ROUNDING = 1e-9
 """Distance from a box, a sphere or a plane at which nodes are on it, in the body's extent."""
 
 
-def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
+def fixed_nodes(
+    mesh: TetrahedralMesh, specification: str, of: int | str | None = None
+) -> BoolArray:
     """Return a mask of the nodes that the text `specification` names.
 
     Args:
@@ -71,11 +74,16 @@ def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
         specification: Sides joined by commas ("left,right"; "underside": all that faces down), or
             the corners of a box in m ("0,0,0:0.01,0.06,0.04"), or centre and radius of a sphere in
             m ("sphere:0.01,0.03,0.04,0.005"), or "none".
+        of: A label, by number or name, or one of several bodies (`tissue.joined`), by name: it is
+            of that part alone, and its sides; None: all of the mesh.
 
     Raises:
         MeshError: The arrays of the mesh have another shape or hold no numbers.
-        ValueError: The text is none of these, or the box or the sphere holds no node.
+        ValueError: The text is none of these, the box or the sphere holds no node, or there is no
+            such part.
     """
+    if of is not None:
+        return _nodes_of_part(mesh, specification, of)
     mesh, text = mesh_arrays(mesh), specification.strip()
     if text.lower() == "none":
         return np.zeros(len(mesh.positions), dtype=bool)
@@ -84,6 +92,19 @@ def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
     if ":" in text:
         return box_nodes(mesh, *_box_corners(text))
     return side_nodes(mesh, text.split(","))
+
+
+def _nodes_of_part(mesh: TetrahedralMesh, specification: str, part: int | str) -> BoolArray:
+    """Return a mask of the nodes of a part that a text names: see `fixed_nodes`."""
+    tetrahedra = part_of_mesh(mesh, part).tetrahedra
+    nodes, own = np.unique(tetrahedra, return_inverse=True)
+    found = np.zeros(len(mesh.positions), dtype=bool)
+    alone = TetrahedralMesh(mesh.positions[nodes], own.reshape(tetrahedra.shape))
+    try:
+        found[nodes] = fixed_nodes(alone, specification)
+    except ValueError as error:
+        raise ValueError(f"of '{part}': {error}") from error
+    return found
 
 
 def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:

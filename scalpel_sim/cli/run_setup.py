@@ -43,6 +43,7 @@ _log = logging.getLogger("scalpel_sim")
 
 _UNKNOWN_TO_CLIENT = frozenset(
     {
+        "bodies",
         "fixed",
         "stretch",
         "gravity",

@@ -17,6 +17,7 @@ from scalpel_sim.cli.options import (
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.blade import expect_faces
 from scalpel_sim.scene.checks import moves_together
+from scalpel_sim.scene.materials import given_in
 from scalpel_sim.scene.read import (
     DEFAULT_SCENE,
     Given,
@@ -30,7 +31,7 @@ from scalpel_sim.scene.read import (
     with_key,
     with_settings,
 )
-from scalpel_sim.scene.scene import GEL, Scene, changed, given_in
+from scalpel_sim.scene.scene import GEL, Scene, changed
 from scalpel_sim.scene.schema import BladeTable, MaterialTable
 from scalpel_sim.strokes.kind import stroke_called
 from scalpel_sim.tables.text_files import as_tables, is_toml_file, read_toml

@@ -199,12 +199,15 @@ class RunOutcome:
     def motion_of_cores(self) -> list[tuple[float, float] | None]:
         """Path [m] and turn [rad] of each rigid core; None where they are not known."""
         found: list[tuple[float, float] | None] = []
-        mesh = TetrahedralMesh(self.first.rest_positions, self.first.tetrahedra)
+        first = self.first
+        mesh = TetrahedralMesh(
+            first.rest_positions, first.tetrahedra, first.labels, self.label_names
+        )
         for row in self.settings.get("cores", []):
             if self.last is None:
                 found.append(None)
                 continue
-            is_inside = fixed_nodes(mesh, row["where"])
+            is_inside = fixed_nodes(mesh, row["where"], row.get("body"))
             core = np.flatnonzero(is_inside[mesh.tetrahedra].all(axis=1))
             before, after = (
                 body.positions[body.tetrahedra[core]].reshape(-1, 3)
@@ -270,7 +273,8 @@ class RunOutcome:
     @property
     def has_one_material(self) -> bool:
         """Whether all of the body is of one material."""
-        return not any(row["material"] for row in self.settings.get("labels", ()))
+        rows = (*self.settings.get("labels", ()), *self.settings.get("bodies", ()))
+        return not any(row["material"] for row in rows)
 
     @cached_property
     def toughness(self) -> FloatArray | None:

@@ -11,11 +11,13 @@ import numpy as np
 from scalpel_sim.arm.standing import Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.labels import unused_labels
-from scalpel_sim.scene.scene import Scene, naming_table
-from scalpel_sim.scene.schema import AttachmentTable, LedSupportTable
+from scalpel_sim.scene.materials import naming_table
+from scalpel_sim.scene.scene import Scene
+from scalpel_sim.scene.schema import AttachmentTable, CoreTable, LedSupportTable
 from scalpel_sim.strokes.stroke import from_csv
 from tissue import (
     Attachment,
+    BoolArray,
     FloatArray,
     FramePath,
     Geom,
@@ -65,12 +67,12 @@ def make_tissue(scene: Scene) -> Tissue:
         TissueError: the body cannot come to rest.
     """
     mesh, solver = scene.mesh(), scene.solver
-    fixed = fixed_nodes(mesh, scene.body.fixed)
+    fixed = scene.held_nodes()
     tissue = Tissue(
         mesh,
         scene.materials,
         fixed=fixed,
-        positions=pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by),
+        positions=_start_of(scene, mesh),
         gravity=scene.world.free_fall,
         floor=scene.world.floor,
         blade=scene.blade,
@@ -92,9 +94,10 @@ def make_tissue(scene: Scene) -> Tissue:
         tissue.collide_with([table.geom], [table.centre])
     for i, core in enumerate(scene.cores):
         naming_table(
-            f"[[core]] number {i + 1}", partial(tissue.make_rigid, core.where, density=core.density)
+            f"[[core]] number {i + 1}",
+            partial(_make_rigid, tissue, mesh, core),
         )
-    attachments = _attached(tissue, scene.attachments)
+    attachments = _attached(tissue, mesh, scene.attachments)
     if fixed.any() or table is not None or attachments:
         tissue.settle()
         _warn_of_collapse(tissue, scene)
@@ -143,24 +146,39 @@ def times_of(table: AttachmentTable) -> list[float]:
     return found
 
 
-def _attached(tissue: Tissue, tables: Sequence[AttachmentTable]) -> list[Attachment]:
+def _make_rigid(tissue: Tissue, mesh: TetrahedralMesh, table: CoreTable) -> int:
+    """Make one rigid core; return its number."""
+    return tissue.make_rigid(_region(mesh, table), density=table.density)
+
+
+def _region(
+    mesh: TetrahedralMesh, table: AttachmentTable | CoreTable | LedSupportTable
+) -> str | BoolArray:
+    """Return the region of a table: as text, or the nodes that are in it and in its body."""
+    return table.where if table.body is None else fixed_nodes(mesh, table.where, table.body)
+
+
+def _attached(
+    tissue: Tissue, mesh: TetrahedralMesh, tables: Sequence[AttachmentTable]
+) -> list[Attachment]:
     """Attach what holds the tissue, before it settles.
 
     Raises:
         UsageError: one cannot be attached; the message names its table.
     """
     return [
-        naming_table(f"[[attachment]] number {i + 1}", partial(_attach, tissue, table))
+        naming_table(f"[[attachment]] number {i + 1}", partial(_attach, tissue, mesh, table))
         for i, table in enumerate(tables)
     ]
 
 
-def _attach(tissue: Tissue, table: AttachmentTable) -> Attachment:
+def _attach(tissue: Tissue, mesh: TetrahedralMesh, table: AttachmentTable) -> Attachment:
     """Make one attachment, or ligament."""
+    where = _region(mesh, table)
     breaks_at = math.inf if table.breaks_at is None else table.breaks_at
     if table.to is None:
         return tissue.attach(
-            table.where,
+            where,
             stiffness=table.stiffness,
             damping=table.damping,
             rest_length=table.rest_length or 0.0,
@@ -168,7 +186,7 @@ def _attach(tissue: Tissue, table: AttachmentTable) -> Attachment:
         )
     assert table.area is not None and table.toughness is not None
     return tissue.tie(
-        table.where,
+        where,
         table.to,
         stiffness=table.stiffness,
         damping=table.damping,
@@ -183,12 +201,12 @@ def _lead(tissue: Tissue, mesh: TetrahedralMesh, table: LedSupportTable) -> None
     """Lead held nodes along their path, from the first frame on."""
     about = table.about
     if about is None:
-        nodes = fixed_nodes(mesh, table.where)
+        nodes = fixed_nodes(mesh, table.where, table.body)
         places = tissue.snapshot().positions[nodes]
         about = tuple((0.5 * (places.min(axis=0) + places.max(axis=0))).tolist())
     turns = None if table.rotations_degrees is None else np.radians(table.rotations_degrees)
     path = SupportPath(table.times, table.displacements, turns, table.stretches, about=about)
-    tissue.lead_supports(table.where, path)
+    tissue.lead_supports(_region(mesh, table), path)
 
 
 def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:
@@ -203,7 +221,7 @@ def _warn_of_collapse(tissue: Tissue, scene: Scene) -> None:
     if material.poisson_ratio < _HARDLY_COMPRESSIBLE:
         remedies.append(f"--poisson-ratio {_HARDLY_COMPRESSIBLE}")
     remedies.append("a larger --young")
-    remedies += ["less --stretch"] * (scene.body.stretched_by != 0.0)
+    remedies += ["less --stretch"] * (scene.stretched_by != 0.0)
     remedies += ["less --gravity"] * any(scene.world.free_fall)
     _log.warning(
         "settled, %.2g %% of the tetrahedra are inside out, and the body has %.3g %% of its "
@@ -227,13 +245,13 @@ def check_scene(scene: Scene) -> None:
         if stroke.file is not None:
             from_csv(stroke.file)
     mesh = scene.mesh()
-    unused = unused_labels(mesh, scene.labels)
+    unused = None if scene.bodies else unused_labels(mesh, scene.labels)
     if unused is not None:
         _log.warning("%s", unused)
-    fixed_nodes(mesh, scene.body.fixed)
-    pulled_apart(mesh.positions, scene.body.fixed, scene.body.stretched_by)
+    scene.held_nodes()
+    _start_of(scene, mesh)
     for i, attachment in enumerate(scene.attachments):
-        region = partial(fixed_nodes, mesh, attachment.where)
+        region = partial(fixed_nodes, mesh, attachment.where, attachment.body)
         naming_table(f"[[attachment]] number {i + 1}", region)
     drag = max(_toughness_in(scene, each) / each.young_modulus for each in scene.all_materials)
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
@@ -260,6 +278,13 @@ def _toughness_in(scene: Scene, material: Material) -> float:
         ratio = scene.speed / material.toughness_speed
         at_speed *= 1.0 + ratio**material.toughness_exponent
     return max(resistance.skin_toughness, at_speed)
+
+
+def _start_of(scene: Scene, mesh: TetrahedralMesh) -> FloatArray:
+    """Return where the nodes are before they settle [m]: at rest, or pulled apart."""
+    if isinstance(scene.body, tuple):
+        return mesh.positions
+    return pulled_apart(mesh.positions, scene.body.fixed, scene.stretched_by)
 
 
 def pulled_apart(positions: FloatArray, fixed: str, stretch: float) -> FloatArray:

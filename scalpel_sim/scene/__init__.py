@@ -2,6 +2,8 @@
 
 schema      the tables of a scene file, each key with its unit, bounds and meaning
 body        the table of the body, and its mesh
+labels      parts of the body, by label
+materials   from tables of materials to those of the engine
 case        the tables of a case: supports, loads, records and expectations
 scene       a scene: all its tables, and the objects of the engine that they describe
 checks      what makes no sense together

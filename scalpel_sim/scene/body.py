@@ -1,4 +1,4 @@
-"""The table `[body]`, and the mesh that it describes."""
+"""The table `[body]`, or the rows of `[[body]]`, and the mesh that they describe."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -7,21 +7,28 @@ from typing import Annotated, Literal, get_args
 
 import numpy as np
 
+from scalpel_sim.errors import UsageError
 from scalpel_sim.meshing.gallbladder import gallbladder
+from scalpel_sim.scene.schema import PresetMaterialTable
+from scalpel_sim.tables.problems import check_keys
 from scalpel_sim.tables.values import (
     CellCounts,
     CellSizes,
     FileName,
     Finite,
+    FourNumbers,
     Kind,
+    Name,
     Positive,
     Region,
     Size,
+    ThreeNumbers,
     TomlTable,
+    TrueOrFalse,
     Whole,
     one_of,
 )
-from tissue import TetrahedralMesh
+from tissue import BoolArray, FloatArray, TetrahedralMesh
 
 BodyShape = Literal["organ", "gallbladder", "block", "lattice", "graded", "cylinder", "mesh"]
 _SHAPES: tuple[BodyShape, ...] = get_args(BodyShape)
@@ -106,6 +113,101 @@ class HeldBodyTable(BodyTable, kw_only=True, frozen=True, dict=True):
         if self.stretch is not None:
             return self.stretch
         return USUAL_STRETCH if self.fixed == USUAL_FIXED else 0.0
+
+
+class OneOfBodiesTable(BodyTable, kw_only=True, frozen=True, dict=True):
+    """`[[body]]` of a scene: one of several bodies, where it lies at rest, and how it is held."""
+
+    name: Name
+    """Name of the body, and of its label in tables and results."""
+    pos: ThreeNumbers = (0.0, 0.0, 0.0)
+    """Where the origin of its shape, or of its file, comes [m]."""
+    quat: FourNumbers = (1.0, 0.0, 0.0, 0.0)
+    """Rotation of the shape about that origin: w, x, y, z."""
+    material: PresetMaterialTable | None = None
+    """Material: a preset, with figures that replace its own; or figures that replace those of
+    `[material]`."""
+    fixed: Region = "none"
+    """Part of this body that is held, as for one body, with sides of its own."""
+    weld: TrueOrFalse = False
+    """Whether it is bonded to those above it where faces of both lie node on node."""
+
+    @cached_property
+    def _mesh(self) -> TetrahedralMesh:
+        from tissue import placed
+
+        return placed(_mesh_of(self), self.pos, self._rotation)
+
+    @property
+    def _rotation(self) -> FloatArray | None:
+        """Axes of the shape as columns, shape (3, 3); None: it is not turned."""
+        if self.quat == (1.0, 0.0, 0.0, 0.0):
+            return None
+        from scipy.spatial.transform import Rotation  # 0.1 s, and few bodies are turned
+
+        return np.asarray(Rotation.from_quat(self.quat, scalar_first=True).as_matrix())
+
+
+Bodies = HeldBodyTable | tuple[OneOfBodiesTable, ...]
+"""`[body]`, or the rows of `[[body]]`."""
+
+
+def check_bodies(bodies: Bodies) -> None:
+    """Check that the keys of a body are those of its shape, and that names of several differ.
+
+    Raises:
+        UsageError: they are not; the message says which.
+    """
+    if isinstance(bodies, GivenBody):
+        return
+    if isinstance(bodies, HeldBodyTable):
+        check_keys(bodies, "[body]", "shape", KEYS_OF_SHAPE)
+        return
+    if not bodies:
+        raise UsageError("the scene has no body; give [body], or rows of [[body]]")
+    for i, body in enumerate(bodies):
+        where = f"[[body]] number {i + 1}"
+        check_keys(body, where, "shape", KEYS_OF_SHAPE)
+        if not any(body.quat):
+            raise UsageError(f"{where} quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
+    names = [body.name for body in bodies]
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise UsageError(f"two of [[body]] are called {twice[0]}; choose another name for one")
+
+
+def mesh_of_bodies(bodies: Bodies) -> TetrahedralMesh:
+    """Return the mesh of one body, or of several, each with labels of its own.
+
+    Raises:
+        MeshError: a file holds no mesh that could be cut, or bodies overlap.
+        ValueError: there can be no such body.
+    """
+    if isinstance(bodies, HeldBodyTable):
+        return bodies.mesh()
+    from tissue import joined
+
+    meshes = {}
+    for body in bodies:
+        try:
+            meshes[body.name] = body.mesh()
+        except ValueError as error:
+            raise type(error)(f"[[body]] '{body.name}': {error}") from error
+    return joined(meshes, weld=[body.name for body in bodies if body.weld])
+
+
+def nodes_held(bodies: Bodies, mesh: TetrahedralMesh) -> BoolArray:
+    """Return which nodes of the mesh of these bodies are held, shape (n_nodes,).
+
+    Raises:
+        ValueError: no node is there.
+    """
+    from tissue import fixed_nodes
+
+    if isinstance(bodies, HeldBodyTable):
+        return fixed_nodes(mesh, bodies.fixed)
+    masks = [fixed_nodes(mesh, body.fixed, body.name) for body in bodies]
+    return np.asarray(np.any(masks, axis=0))
 
 
 class GivenBody(HeldBodyTable, kw_only=True, frozen=True, dict=True):

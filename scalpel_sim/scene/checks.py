@@ -3,7 +3,7 @@
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -226,6 +226,30 @@ def check_attachment(table: AttachmentTable, where: str) -> None:
         raise UsageError(f"{where} has times {table.times}; they begin above 0 and increase")
 
 
+def check_parts(bodies: Sequence[str], arrays: Mapping[str, Sequence[Any]]) -> None:
+    """Check that rows that are about a part name a body that there is.
+
+    Args:
+        bodies: Names of the bodies, where there are several.
+        arrays: Rows with a `body`, by the name of their array.
+
+    Raises:
+        UsageError: one names no body, or a label with a region says nothing of which body it is.
+    """
+    for kind, rows in arrays.items():
+        for i, row in enumerate(rows):
+            where = f"[[{kind}]] number {i + 1}"
+            if row.body is not None and row.body not in bodies:
+                if not bodies:
+                    raise UsageError(f"{where} has a body, and the scene has one; omit it")
+                raise UsageError(f"{where}: {unknown('body', row.body, bodies)}")
+            is_own = isinstance(row, LabelTable) and (row.label, row.region) != (None, None)
+            if bodies and is_own and row.body is None:
+                raise UsageError(
+                    f"{where} has no body; with several it says of which: {', '.join(bodies)}"
+                )
+
+
 def check_rows(
     kind: str, rows: Sequence[msgspec.Struct], check: Callable[[Any, str], None]
 ) -> None:
@@ -241,7 +265,13 @@ def check_rows(
     """
     for i, row in enumerate(rows):
         check(row, f"[[{kind}]] number {i + 1}")
-    check_different(kind, [row.name for row in rows if hasattr(row, "name")])
+    bodies = [getattr(row, "body", None) for row in rows]
+    names = [
+        row.name if body is None else f"{body}/{row.name}"
+        for row, body in zip(rows, bodies, strict=True)
+        if hasattr(row, "name")
+    ]
+    check_different(kind, names)
 
 
 def check_different(kind: str, names: Iterable[str]) -> None:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scalpel_sim.scene.labels import full_name
 from scalpel_sim.scene.scene import Scene
 from tissue import MATERIALS, Material, TetrahedralMesh
 
@@ -55,7 +56,7 @@ class LabelColours(NamedTuple):
 def colours_of_scene(scene: Scene) -> tuple[LabelColours, ...]:
     """Return the colours of the labels of a scene's body; none of a body with one label."""
     mesh = scene.mesh()
-    given = {row.name: row.colour for row in scene.labels if row.colour is not None}
+    given = {full_name(row): row.colour for row in scene.labels if row.colour is not None}
     materials = scene.materials
     return colours_of_labels(
         mesh, given, materials if isinstance(materials, Mapping) else {None: materials}
@@ -80,13 +81,12 @@ def colours_of_labels(
     labels: Sequence[int] = [] if mesh.labels is None else np.unique(mesh.labels).tolist()
     if len(labels) < 2:
         return ()
-    rest = materials.get(None)
-    tissues = {n: _tissue_of(materials.get(mesh.label_names.get(n), rest)) for n in labels}
+    tissues = {n: _tissue_of(_material_of(mesh.label_names.get(n), materials)) for n in labels}
     found: dict[int, tuple[str, str]] = {}
     for label in labels:
         name = mesh.label_names.get(label, "")
         own = given.get(name)
-        pair = _expected(name) if own is None else (own[1:].lower(),) * 2
+        pair = _expected(name.rpartition("/")[2]) if own is None else (own[1:].lower(),) * 2
         if pair is not None:
             found[label] = pair
     palette = iter(PALETTE * (len(labels) // len(PALETTE) + 1))
@@ -99,6 +99,16 @@ def colours_of_labels(
     return tuple(
         LabelColours(n, mesh.label_names.get(n) or _title(n, tissues[n]), *found[n]) for n in labels
     )
+
+
+def _material_of(
+    name: str | None, materials: Mapping[int | str | None, Material]
+) -> Material | None:
+    """Return the material of a label: its own, that of its body, or of the rest."""
+    rest = materials.get(None)
+    if name is None:
+        return rest
+    return materials.get(name, materials.get(name.partition("/")[0], rest))
 
 
 def _title(label: int, tissue: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import msgspec
 
+from scalpel_sim.scene.body import BodyTable, OneOfBodiesTable
 from scalpel_sim.scene.case import CaseContent
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import WaypointTable
@@ -46,6 +47,7 @@ def _keys(name: str) -> str:
         tables |= {
             key: table_of(kind) or row_table_of(kind) for key, kind in kinds_of(root).items()
         }
+    tables["one_of_bodies"] = row_table_of(kinds_of(Scene)["body"])
     tables["case_blade"] = table_of(kinds_of(CaseContent)["blade"])
     tables["case_support"] = row_table_of(kinds_of(CaseContent)["support"])
     table = tables[name]
@@ -56,7 +58,8 @@ def _keys(name: str) -> str:
 def _rows(table: type[msgspec.Struct]) -> str:
     """Return a line for each key: its name, its usual value and its meaning."""
     lines, texts = ["| key | meaning |", "|---|---|"], texts_of(table)
-    for field in msgspec.structs.fields(table):
+    known = msgspec.structs.fields(BodyTable) if table is OneOfBodiesTable else ()
+    for field in msgspec.structs.fields(table)[len(known) :]:
         if table is Scene and (table_of(field.type) or row_table_of(field.type)):
             continue
         lines.append(f"| `{field.encode_name}`{_usual(field)} | {texts[field.name]} |")

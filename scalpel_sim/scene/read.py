@@ -215,10 +215,10 @@ def _with_files(content: Any, table: type[msgspec.Struct], change: Callable[[str
     found = dict(content)
     for key, kind in kinds_of(table).items():
         value, inner, row = found.get(key), table_of(kind), row_table_of(kind)
-        if inner is not None and value is not None:
-            found[key] = _with_files(value, inner, change)
-        elif row is not None and isinstance(value, list):
+        if row is not None and isinstance(value, list):
             found[key] = [_with_files(each, row, change) for each in value]
+        elif inner is not None and value is not None:
+            found[key] = _with_files(value, inner, change)
         elif isinstance(value, str) and any(meta.extra for meta in metas_of(kind)):
             found[key] = change(value)
     return found

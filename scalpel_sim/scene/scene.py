@@ -1,23 +1,31 @@
 """A scene: a body, its material, how it is held, and the strokes through it."""
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import msgspec
 from msgspec import field, structs
 
 from bridge import VirtualCoupling
-from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.blade import blade_of, table_of_blade
-from scalpel_sim.scene.body import KEYS_OF_SHAPE, GivenBody, HeldBodyTable
+from scalpel_sim.scene.body import (
+    Bodies,
+    GivenBody,
+    HeldBodyTable,
+    OneOfBodiesTable,
+    check_bodies,
+    mesh_of_bodies,
+    nodes_held,
+)
 from scalpel_sim.scene.checks import (
     check_arm,
     check_attachment,
     check_grasper,
     check_label,
+    check_parts,
     check_range,
     check_rows,
     check_solver,
@@ -25,7 +33,8 @@ from scalpel_sim.scene.checks import (
     check_view,
     virtual_coupling,
 )
-from scalpel_sim.scene.labels import labelled
+from scalpel_sim.scene.labels import full_name, labelled
+from scalpel_sim.scene.materials import given_in, material_in, material_of, naming_table
 from scalpel_sim.scene.schema import (
     ArmTable,
     AttachmentTable,
@@ -41,18 +50,14 @@ from scalpel_sim.scene.schema import (
 )
 from scalpel_sim.strokes.kind import StrokeTable, stroke_called
 from scalpel_sim.strokes.scene_stroke import check_strokes
-from scalpel_sim.tables.problems import check_keys
 from scalpel_sim.tables.values import NameOfScene, Positive, Text, TomlTable
-from tissue import MATERIALS, BladeShape, CutSettings, Material, TetrahedralMesh
+from tissue import MATERIALS, BladeShape, BoolArray, CutSettings, Material, TetrahedralMesh
 
 GEL = Material(blade_friction=MATERIALS["gelatin"].blade_friction.value)
 """A soft gel that barely changes its volume, as tetrahedra: what a body is made of, unless another
 material is given. Its toughness / Young's modulus is 2 mm, the length by which the blade drags
 the tissue along before it parts. That must be small against the body, or the blade drags the body
 along instead of cutting it."""
-
-Made = TypeVar("Made")
-"""Type that `naming_table` returns."""
 
 
 class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
@@ -70,8 +75,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """A description in one line."""
     seconds: Positive | None = None
     """Time to simulate [s; default: the strokes and 0.3 s more]."""
-    body: HeldBodyTable
-    """The geometry, and how it is held."""
+    body: Bodies
+    """The geometry, and how it is held: one body, or the rows of several."""
     material_table: PresetMaterialTable | None = field(default=None, name="material")
     """The material; a soft gel without."""
     labels: tuple[LabelTable, ...] = field(default=(), name="label")
@@ -99,12 +104,12 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""
-        if not isinstance(self.body, GivenBody):
-            check_keys(self.body, "[body]", "shape", KEYS_OF_SHAPE)
+        check_bodies(self.body)
+        check_parts([body.name for body in self.bodies], self._rows_of_parts)
         check_strokes(self.strokes)
         check_solver(self.solver, self.material)
         _ = self.cut, self.blade  # they check themselves
-        check_range(self.body.stretched_by, self.world.free_fall, self.seconds)
+        check_range(self.stretched_by, self.world.free_fall, self.seconds)
         check_arm(self.arm, self.world)
         _ = self.materials
         check_rows("label", self.labels, check_label)
@@ -113,9 +118,36 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_rows("grasper", self.graspers, check_grasper)
         check_rows("view", self.views, check_view)
 
+    @property
+    def bodies(self) -> tuple[OneOfBodiesTable, ...]:
+        """The bodies, where there are several; none where there is one."""
+        return () if isinstance(self.body, HeldBodyTable) else self.body
+
+    @property
+    def stretched_by(self) -> float:
+        """Fraction by which opposite held sides are pulled apart: none of several bodies."""
+        return self.body.stretched_by if isinstance(self.body, HeldBodyTable) else 0.0
+
+    @property
+    def _rows_of_parts(self) -> dict[str, Sequence[TomlTable]]:
+        """Rows that may name one of several bodies, by the name of their array."""
+        return {
+            "label": self.labels,
+            "attachment": self.attachments,
+            "core": self.cores,
+            "support": self.supports,
+        }
+
     @cached_property
     def material(self) -> Material:
-        """Material of the body."""
+        """Material of the body; of several bodies without `[material]` that of the first."""
+        if self.material_table is None and self.bodies:
+            return self.material_of_body(self.bodies[0])
+        return self._usual_material
+
+    @cached_property
+    def _usual_material(self) -> Material:
+        """Material of `[material]`; a soft gel without."""
         table = self.material_table
         if table is None:
             return GEL
@@ -123,11 +155,13 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
 
     @cached_property
     def materials(self) -> Material | dict[int | str | None, Material]:
-        """Material of the body; or, where labels have their own, of each and of the rest (None)."""
+        """Material of the body; or, where parts have their own, of each and of the rest (None)."""
         own: dict[int | str | None, Material] = {
-            row.name: self._material_of_label(row) for row in self.labels if row.material
+            body.name: self.material_of_body(body) for body in self.bodies
         }
-        return {None: self.material, **own} if own else self.material
+        usual: dict[int | str | None, Material] = {} if own else {None: self.material}
+        own |= {full_name(row): self._material_of_label(row) for row in self.labels if row.material}
+        return usual | own if own else self.material
 
     @property
     def all_materials(self) -> tuple[Material, ...]:
@@ -136,16 +170,14 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         found = (materials,) if isinstance(materials, Material) else materials.values()
         return tuple(dict.fromkeys(found))
 
+    def material_of_body(self, body: OneOfBodiesTable) -> Material:
+        """Return the material of one of several bodies."""
+        return material_in(f"[[body]] '{body.name}'", body.material, self._usual_material)
+
     def _material_of_label(self, row: LabelTable) -> Material:
-        table = row.material
-        assert table is not None
-
-        def made() -> Material:
-            if table.preset is not None:
-                return material_of(table)
-            return self.material.changed(**given_in(table))
-
-        return naming_table(f"[[label]] '{row.name}'", made)
+        owner = next((body for body in self.bodies if body.name == row.body), None)
+        usual = self.material if owner is None else self.material_of_body(owner)
+        return material_in(f"[[label]] '{row.name}'", row.material, usual)
 
     @cached_property
     def blade(self) -> BladeShape | None:
@@ -161,7 +193,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         return naming_table("[solver]", lambda: CutSettings(**settings))
 
     def mesh(self) -> TetrahedralMesh:
-        """Return the mesh of the body.
+        """Return the mesh of the body, or of all bodies.
 
         Raises:
             MeshError: it cannot be cut.
@@ -171,7 +203,15 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
 
     @cached_property
     def _labelled_mesh(self) -> TetrahedralMesh:
-        return labelled(self.body.mesh(), self.labels)
+        return labelled(mesh_of_bodies(self.body), self.labels, self.bodies)
+
+    def held_nodes(self) -> BoolArray:
+        """Return which nodes of the mesh are held, shape (n_nodes,).
+
+        Raises:
+            ValueError: no node is where it is to be held.
+        """
+        return nodes_held(self.body, self.mesh())
 
     @property
     def stroke(self) -> str:
@@ -202,12 +242,13 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "about": self.about,
             "material": self.material.as_keys(),
             "labels": [self._settings_of_label(row) for row in self.labels],
-            "fixed": self.body.fixed,
+            "bodies": [self._settings_of_body(body) for body in self.bodies],
+            "fixed": None if isinstance(self.body, tuple) else self.body.fixed,
             "cut": asdict(self.cut),
             **_values(
                 solver, "scheme", "relaxation", "mass_scaling", "element", "precision", "threads"
             ),
-            "stretch": self.body.stretched_by,
+            "stretch": self.stretched_by,
             **_values(world, "gravity", "floor", "table", "table_friction"),
             "blade": None if self.blade is None else asdict(self.blade),
             "audit": solver.audit,
@@ -228,7 +269,14 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     def _settings_of_label(self, row: LabelTable) -> dict[str, Any]:
         """Return what a report has of a label: its material as numbers, where it has its own."""
         material = None if row.material is None else self._material_of_label(row).as_keys()
-        return {"name": row.name, "spare": row.spare, "material": material}
+        return {"name": full_name(row), "spare": row.spare, "material": material}
+
+    def _settings_of_body(self, body: OneOfBodiesTable) -> dict[str, Any]:
+        """Return what a report has of one of several bodies: its material as numbers."""
+        material = self.material_of_body(body).as_keys()
+        return _values(body, "name", "shape", "pos", "quat", "fixed", "weld") | {
+            "material": material
+        }
 
 
 def _values(table: TomlTable, *keys: str) -> dict[str, Any]:
@@ -255,9 +303,14 @@ def changed(scene: Scene, **changes: Any) -> Scene:
         material = given.pop("material", scene.material)
         material = material.changed(**{name: given.pop(name) for name in properties})
         given["material_table"] = PresetMaterialTable(**material.as_keys())
-    if "mesh" in given:
-        fixed, stretch = scene.body.fixed, scene.body.stretch
-        given["body"] = GivenBody(source=given.pop("mesh"), fixed=fixed, stretch=stretch)
+    if isinstance(scene.body, tuple):
+        _refuse_of_one_body(given)
+    else:
+        if "mesh" in given:
+            fixed, stretch = scene.body.fixed, scene.body.stretch
+            given["body"] = GivenBody(source=given.pop("mesh"), fixed=fixed, stretch=stretch)
+        if given.get("fixed", scene.body.fixed) != scene.body.fixed:
+            given.setdefault("stretch", 0.0)
     if "blade" in given:
         given["blade_table"] = table_of_blade(given.pop("blade"))
     if "stroke" in given:
@@ -266,65 +319,24 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     if of_strokes:
         strokes = given.get("strokes", scene.strokes)
         given["strokes"] = tuple(structs.replace(stroke, **of_strokes) for stroke in strokes)
-    if given.get("fixed", scene.body.fixed) != scene.body.fixed:
-        given.setdefault("stretch", 0.0)
     for name in ("body", "world", "solver", "arm"):
         table = given.get(name, getattr(scene, name))
+        if isinstance(table, tuple):  # several bodies
+            continue
         own = {key: given.pop(key) for key in table.__struct_fields__ if key in given}
         if own:
             given[name] = structs.replace(table, **own)
     return Scene(**structs.asdict(scene) | given)  # which checks itself
 
 
-def material_called(name: str) -> Material:
-    """Return the material of that name.
+def _refuse_of_one_body(changes: Mapping[str, Any]) -> None:
+    """Refuse changes of the one body of a scene that has several.
 
     Raises:
-        UsageError: there is none; the message lists them.
+        UsageError: there is one.
     """
-    if name not in MATERIALS:
-        raise unknown("material", name, MATERIALS)
-    return MATERIALS[name].material
-
-
-def material_of(table: PresetMaterialTable) -> Material:
-    """Return the material: figures that are given, those of a preset, and the usual ones.
-
-    Raises:
-        UsageError: there is no such preset, or neither a preset nor law and stiffness.
-        ValueError: the figures make no sense together.
-    """
-    given = given_in(table)
-    preset = given.pop("preset", None)
-    if preset is not None:
-        return material_called(preset).changed(**given)
-    if "law" not in given or "young_modulus" not in given:
-        raise UsageError("it needs a preset, or a law and a young_modulus")
-    return Material.of_keys(given)
-
-
-def given_in(table: msgspec.Struct) -> dict[str, Any]:
-    """Return the keys of a table that are given, and their values; rows of it as such too."""
-    return {
-        key: [given_in(row) for row in value]
-        if isinstance(value, list) and value and isinstance(value[0], msgspec.Struct)
-        else value
-        for key, value in structs.asdict(table).items()
-        if value is not None
-    }
-
-
-def naming_table(where: str, make: Callable[[], Made]) -> Made:
-    """Return what a function makes; an error of its input says where in the file that stands.
-
-    Args:
-        where: Name of a table, as a file writes it.
-        make: The function.
-
-    Raises:
-        UsageError: the input is wrong.
-    """
-    try:
-        return make()
-    except ValueError as error:
-        raise UsageError(f"{where}: {error}") from error
+    for name in ("mesh", *HeldBodyTable.__struct_fields__):
+        if name in changes:
+            raise UsageError(
+                f"{name} is of one body, and the scene has several: change the rows of [[body]]"
+            )

@@ -120,13 +120,15 @@ class LabelTable(TomlTable, kw_only=True, frozen=True):
 
     name: Label
     """Name of the part. Without `label` and `region` it is that of a group of the mesh file."""
+    body: Text | None = None
+    """Body that it is a part of, where there are [several](#several-bodies)."""
     label: LabelNumber | None = None
     """Number of the part in the mesh file."""
     region: Region | None = None
     """Box or sphere, as for `fixed`: the elements whose middles are in it."""
     material: PresetMaterialTable | None = None
     """Material: a preset, with figures that replace its own; or figures that replace those of
-    `[material]`."""
+    `[material]`, or of its body."""
     colour: HexColour | None = None
     """Colour on pages, in figures and in exported files, "#rrggbb"; without, that of the tissue
     which the name or the material says."""
@@ -262,6 +264,8 @@ class AttachmentTable(TomlTable, kw_only=True, frozen=True):
 
     where: Region
     """Region whose nodes it holds, as for `fixed`; of a box or a sphere also the nodes inside."""
+    body: Text | None = None
+    """Body whose region that is, where there are [several](#several-bodies); all without."""
     stiffness: Positive
     """Stiffness of all springs together [N/m]."""
     damping: NotNegative = 0.0
@@ -294,6 +298,8 @@ class CoreTable(TomlTable, kw_only=True, frozen=True):
 
     where: Region
     """Region, as for `fixed`: the core is made of the elements that are wholly in it."""
+    body: Text | None = None
+    """Body whose region that is, where there are several; all without."""
     density: Positive | None = None
     """Density, at least that of the tissue, and the same without [kg/m3]."""
 
@@ -303,6 +309,8 @@ class LedSupportTable(TomlTable, kw_only=True, frozen=True):
 
     where: Region
     """Region whose held nodes it leads, as for `fixed`."""
+    body: Text | None = None
+    """Body whose region that is, where there are several; all without."""
     times: Times
     """When they are at each row, after the start, above 0 [s]. From row to row all changes evenly;
     after the last they stay."""

@@ -8,7 +8,7 @@ import msgspec
 import tomlkit
 
 from scalpel_sim.scene.blade import table_of_blade
-from scalpel_sim.scene.body import GivenBody
+from scalpel_sim.scene.body import GivenBody, HeldBodyTable
 from scalpel_sim.scene.checks import OF_OWN_ARM, OF_PLACE
 from scalpel_sim.scene.read import with_files
 from scalpel_sim.scene.scene import Scene
@@ -38,7 +38,10 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
         folder: Folder that its relative paths are relative to.
     """
     content = msgspec.to_builtins(scene)
-    content["body"]["stretch"] = scene.body.stretched_by
+    if isinstance(scene.body, HeldBodyTable):
+        content["body"]["stretch"] = scene.stretched_by
+    for row, body in zip(content["body"] if scene.bodies else (), scene.bodies, strict=True):
+        row["material"] = msgspec.to_builtins(scene.material_of_body(body).as_keys())
     content["material"] = msgspec.to_builtins(scene.material.as_keys())
     content["blade"] = {"thickness": 0.0}
     if scene.blade is not None:

@@ -172,13 +172,13 @@ def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
 
 
 def _sheet(kind: str, mesh: TetrahedralMesh, edges: IntArray, bend: Bend | None) -> PlannedSheet:
-    """Return the first sheet that parts the body in two, or else the first of all."""
+    """Return the first sheet that parts each piece it meets in two, or else the first of all."""
     from tissue.support import components  # loads numba
 
-    pieces, _ = components(len(mesh.positions), edges)
+    _, piece = components(len(mesh.positions), edges)
     first = None
     for sheet in _candidates(mesh, edges, bend):
-        if _divides(sheet, mesh, edges, pieces):
+        if _divides(sheet, mesh, edges, piece):
             return sheet
         first = first or sheet
     if first is None:
@@ -220,11 +220,12 @@ def _middle_section(cut: FloatArray, width: float) -> MiddleSection:
     )
 
 
-def _divides(sheet: PlannedSheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) -> bool:
-    """Whether the sheet leaves one piece more than there was, and both held sides whole.
+def _divides(sheet: PlannedSheet, mesh: TetrahedralMesh, edges: IntArray, piece: IntArray) -> bool:
+    """Whether the sheet leaves two of each piece that it meets, and both held sides whole.
 
-    A tetrahedron's part on one side of the sheet holds its nodes on that side, joined by edges; so
-    the parts of the body hang together as its nodes do along the edges that do not cross.
+    `piece` is that of each node. A tetrahedron's part on one side of the sheet holds its nodes on
+    that side, joined by edges; so the parts of the body hang together as its nodes do along the
+    edges that do not cross.
     """
     from tissue.support import components
 
@@ -234,7 +235,9 @@ def _divides(sheet: PlannedSheet, mesh: TetrahedralMesh, edges: IntArray, pieces
     x = mesh.positions[:, 0]
     margin = _HELD * np.ptp(x)
     left, right = above[x <= x.min() + margin], above[x >= x.max() - margin]
-    return parts == pieces + 1 and not left.any() and bool(right.all())
+    sides = len(np.unique(2 * piece + above))  # a piece has nodes on one or on both
+    is_met = sides > piece.max() + 1
+    return is_met and parts == sides and not left.any() and bool(right.all())
 
 
 def _displacement(width: float, length: float, thickness: float, material: Material) -> float:

@@ -63,7 +63,7 @@ def _problem_at(
         key, _ = rest.pop(0)
         kind, value, at = kinds_of(table)[key], value[key], (*at, key)
         row, inner = row_table_of(kind), table_of(kind)
-        if row is not None:
+        if row is not None and (inner is None or isinstance(value, list)):
             i = int(rest.pop(0)[1]) if rest else 0
             if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
                 what = f"tables: [[{key}]], then a key a line"
@@ -129,17 +129,20 @@ def alternatives(kind: Any) -> Sequence[Any]:
 
 
 def table_of(kind: Any) -> _Table | None:
-    """Return the table that a value must be; None where it is none."""
-    only = alternatives(kind)[0]
-    return only if isinstance(only, type) and issubclass(only, msgspec.Struct) else None
+    """Return the table that a value may be; None where it is none."""
+    for each in alternatives(kind):
+        if isinstance(each, type) and issubclass(each, msgspec.Struct):
+            return each
+    return None
 
 
 def row_table_of(kind: Any) -> _Table | None:
-    """Return the table that each row of a value must be; None where it is no array of tables."""
-    only = alternatives(kind)[0]
-    if get_origin(only) is typing.Annotated:
-        only = get_args(only)[0]
-    return table_of(get_args(only)[0]) if get_origin(only) in (list, tuple) else None
+    """Return the table that each row of a value may be; None where it is no array of tables."""
+    for each in alternatives(kind):
+        only = get_args(each)[0] if get_origin(each) is typing.Annotated else each
+        if get_origin(only) in (list, tuple) and (row := table_of(get_args(only)[0])) is not None:
+            return row
+    return None
 
 
 def metas_of(kind: Any) -> list[msgspec.Meta]:
@@ -182,9 +185,9 @@ def _unknown_key(
 
 def _as_header(name: str, kind: Any) -> str:
     """Return how a file writes what is missing."""
-    if row_table_of(kind) is not None:
-        return f"[[{name}]]"
-    return f"[{name}]" if table_of(kind) is not None else f"{name}: {_allowed(kind)}"
+    if table_of(kind) is not None:
+        return f"[{name}]"
+    return f"[[{name}]]" if row_table_of(kind) is not None else f"{name}: {_allowed(kind)}"
 
 
 def _allowed(kind: Any) -> str:

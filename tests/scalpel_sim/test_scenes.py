@@ -4,7 +4,8 @@ import sys
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.scene.scene import changed, material_called
+from scalpel_sim.scene.materials import material_called
+from scalpel_sim.scene.scene import changed
 from tissue import Exponential, NeoHookean, Yeoh
 
 GRID2 = SCENES["grid2"]

@@ -220,6 +220,27 @@ def fastest_node(system: TissueModel, accelerations: FloatArray) -> FastestNode:
     return FastestNode(node, system.body.positions[node], float(sizes[node]))
 
 
+def restless(
+    system: TissueModel,
+    fastest: FastestNode,
+    begin: FloatArray,
+    n_steps: int,
+    support: SupportConditions,
+) -> TissueError:
+    """Return the error of a body that is accelerated as if it fell, after many steps.
+
+    Args:
+        system: The body.
+        fastest: The node that is accelerated most.
+        begin: Where that was at first [m], shape (3,).
+        n_steps: Steps that it took.
+        support: What the body should have come to rest on.
+    """
+    if len(_loose_piece(system, fastest.node)):
+        return gone_too_far(system, fastest.node, begin, support)
+    return TissueError(f"the body cannot come to rest: {fastest.described(n_steps, support)}")
+
+
 def warn_of_motion(
     system: TissueModel,
     n_steps: int,

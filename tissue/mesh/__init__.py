@@ -11,6 +11,9 @@ In the order in which they are best read:
     point_location    which tetrahedron holds a point, by that grid
     bounding_boxes    the box around the body, and boxes around its parts
     pieces            the connected pieces, and the loose ones
+    parts             parts of a mesh, by their labels
+    joined            several bodies as one mesh
+    overlaps          whether two bodies lie in each other
     validation        a mesh that the engine can work with, or an error
     nonconforming     faces of two sizes that meet, in the paper's scheme alone
 """

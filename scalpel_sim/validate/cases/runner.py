@@ -17,7 +17,7 @@ from scalpel_sim.scene.case import (
     RecordTable,
     SupportTable,
 )
-from scalpel_sim.scene.scene import material_of, naming_table
+from scalpel_sim.scene.materials import material_of, naming_table
 from tissue import (
     BladeSegment,
     BladeShape,
