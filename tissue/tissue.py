@@ -1,13 +1,12 @@
 """`Tissue`: a tetrahedral body that a blade can cut."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy.typing as npt
 
 from tissue.blade.prescribed_cut import checked_edges
 from tissue.blade_shape import BladeShape
-from tissue.body_materials import LabelKey, chosen, materials_of, scaled
 from tissue.body_view import BodyView
 from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact
@@ -27,7 +26,8 @@ from tissue.state.tissue_state import Around, TissueState
 from tissue.stepping.acting_forces import ActingForce, acting_forces
 from tissue.stepping.assembly import assembled
 from tissue.stepping.checked_steps import CheckedSteps
-from tissue.stepping.material_changes import change_materials
+from tissue.stepping.given_layers import MaterialOf, materials_and_layers
+from tissue.stepping.material_changes import scale_materials
 from tissue.types import Chunks, SchemeStatistics, StepResult, TetrahedralMesh
 
 
@@ -37,7 +37,8 @@ class Tissue(BodyView):
     Args:
         mesh: The body at rest.
         material: What it is made of: one material; or one for each label of the mesh, by number or
-            name, and by None for all others. They have the same law.
+            name, and by None for all others, of the same law; and by two labels, for a layer
+            between them that the cut follows, its toughness [J/m2].
         fixed: The supports, which stay or move as `move_supports` says, shape (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
@@ -54,7 +55,7 @@ class Tissue(BodyView):
     def __init__(
         self,
         mesh: TetrahedralMesh,
-        material: Material | Mapping[LabelKey, Material] | None = None,
+        material: MaterialOf | None = None,
         *,
         fixed: BoolArray | None = None,
         positions: FloatArray | None = None,
@@ -64,25 +65,25 @@ class Tissue(BodyView):
         solver: SolverSettings = SolverSettings(),
     ) -> None:
         mesh, averages_shear = expect_sound(mesh), solver.element == "averaged"
-        materials = materials_of(mesh, material or Material(), averages_shear=averages_shear)
-        self.material = materials.reference
-        self.label_names, others = dict(mesh.label_names), (blade, floor, solver)
+        parts = materials_and_layers(mesh, material or Material(), averages_shear=averages_shear)
+        self.material = parts[0].reference
+        self.blade, self.floor, self.solver = others = (blade, floor, solver)
+        self.label_names = dict(mesh.label_names)
         """Names of labels, of those that have one."""
-        self.blade, self.floor, self.solver = others
-        self._stages = assembled(mesh, fixed, positions, gravity, materials, *others)
+        self._stages = assembled(mesh, fixed, positions, gravity, parts, *others)
         self._steps = CheckedSteps(self._stages)
         self._model = model = self._stages.model
         self.node_size = model.node_size
         """Mean node size of the body before any cut [m]."""
         gravity_now = model.surroundings.gravity
-        self._identity = Identity.of(model.body, gravity_now, materials.by_label, *others)
+        self._identity = Identity.of(model.body, gravity_now, parts[0].by_label, *others)
         self._spares = Spares()
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Advance the body by `dt` [s] while the blade does `sweep`.
 
-        A step that goes wrong (`tissue.stepping.judgement`) is done again in shorter ones, up to
-        three times. If that fails, the body stays as before, and is only read until `load_state`.
+        A step that goes wrong (`stepping.judgement`) is done again in shorter ones, up to three
+        times. If that fails, the body stays as before, and is only read until `load_state`.
 
         Args:
             sweep: Motion of the cutting edge, or None where no blade is near.
@@ -103,8 +104,8 @@ class Tissue(BodyView):
         """Cut along a given surface in the body at rest; return the area of one side [m2].
 
         There is no blade and no force, and no time passes: for tissue that was cut before. The edge
-        goes in straight lines from place to place. As with a blade only its front cuts: a point
-        that goes back cuts nothing until it is ahead of where it has been.
+        goes in straight lines from place to place, and follows no layer. As with a blade only its
+        front cuts: a point that goes back cuts nothing until it is ahead of where it has been.
 
         Args:
             edges: Places of the cutting edge in the body at rest [m], from tip to heel, shape
@@ -260,7 +261,8 @@ class Tissue(BodyView):
         puts them back. Factors of two calls multiply.
 
         Args:
-            where: A label, by number or name; or a mask of tetrahedra, shape (n_tets,); None: all.
+            where: A label, by number or name; a mask of tetrahedra, shape (n_tets,); None: all; or
+                two labels, for the layer between them, which has `toughness`.
             factors: Factors of `young_modulus`, `density`, `toughness`, `stiffening` or
                 `retardation_time`: a number, or one for each of these tetrahedra.
 
@@ -268,11 +270,8 @@ class Tissue(BodyView):
             ValueError: there is no such label or quantity, no tetrahedron is there, or a factor is
                 not finite and positive, or has another shape.
         """
-        body = self._body
-        rows = body.material[: body.n_tetrahedra]
-        mask = chosen(body.materials, rows, self.label_names, where)
-        changed = scaled(body.materials, rows, mask, factors)
-        self._steps.with_room(lambda: change_materials(self._stages, *changed))
+        names = self.label_names
+        self._steps.with_room(lambda: scale_materials(self._stages, names, where, factors))
 
     def move_supports(self, where: str | npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """Move fixed nodes at a velocity, from the next step on until it is given again.

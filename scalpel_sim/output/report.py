@@ -71,6 +71,8 @@ def print_summary(summary: Summary, console: Console) -> None:
     console.print(table)
     if summary.labels:
         console.print(_labels(summary))
+    if summary.interfaces:
+        console.print(_interfaces(summary))
     if summary.warnings:
         warnings = Table(title="warnings", title_justify="left", show_header=False, show_lines=True)
         warnings.add_column(style="bold", no_wrap=True)
@@ -95,6 +97,18 @@ def _labels(summary: Summary) -> Table:
             f"{_MM2_PER_M2 * row['cut_area_m2']:,.1f} mm\u00b2",
             f"{row['pieces']}",
         )
+    return table
+
+
+def _interfaces(summary: Summary) -> Table:
+    """Return the figures of the layers between parts of the body as a table."""
+    table = Table(title="layers between parts", title_justify="left")
+    table.add_column("between", style="bold")
+    for name in ("area", "dissected"):
+        table.add_column(name, justify="right")
+    for row in summary.interfaces:
+        areas = (_MM2_PER_M2 * row[name] for name in ("area_m2", "cut_area_m2"))
+        table.add_row(" and ".join(row["between"]), *(f"{area:,.1f} mm\u00b2" for area in areas))
     return table
 
 

@@ -272,9 +272,9 @@ class RunOutcome:
 
     @property
     def has_one_material(self) -> bool:
-        """Whether all of the body is of one material."""
+        """Whether all of the body is of one material, without a layer in it."""
         rows = (*self.settings.get("labels", ()), *self.settings.get("bodies", ()))
-        return not any(row["material"] for row in rows)
+        return not (self.settings.get("interfaces") or any(row["material"] for row in rows))
 
     @cached_property
     def toughness(self) -> FloatArray | None:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from scalpel_sim.output.interface_figures import interface_figures
 from scalpel_sim.output.label_figures import label_figures
 from scalpel_sim.output.run_outcome import RunOutcome
 from scalpel_sim.output.run_warnings import RunWarning
@@ -86,6 +87,9 @@ class Summary(NamedTuple):
     labels: list[dict[str, Any]]
     """Of each labelled part of the body: `label`, `name`, `spare`, `volume_m3`, `cut_area_m2`, and
     in how many pieces it is. Empty without labels."""
+    interfaces: list[dict[str, Any]]
+    """Of each layer between two parts: `between`, `toughness_j_m2`, `area_m2` at rest, and
+    `cut_area_m2`, how much of it is open."""
     cores: list[dict[str, Any]]
     """Of each rigid core: how far it has moved and turned from the first frame to the last."""
     attachments: list[dict[str, Any]]
@@ -145,6 +149,7 @@ def summarise(outcome: RunOutcome, warnings: Iterable[RunWarning] = ()) -> Summa
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
         strokes=_strokes(outcome),
         labels=label_figures(outcome),
+        interfaces=interface_figures(outcome),
         cores=_cores(outcome),
         attachments=_attachments(outcome),
         work_of_blade_j=work,

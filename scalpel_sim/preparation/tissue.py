@@ -70,7 +70,7 @@ def make_tissue(scene: Scene) -> Tissue:
     fixed = scene.held_nodes()
     tissue = Tissue(
         mesh,
-        scene.materials,
+        scene.materials_and_layers,
         fixed=fixed,
         positions=_start_of(scene, mesh),
         gravity=scene.world.free_fall,

@@ -33,6 +33,7 @@ from scalpel_sim.scene.checks import (
     check_view,
     virtual_coupling,
 )
+from scalpel_sim.scene.interfaces import InterfaceTable, check_interfaces, expect_parts
 from scalpel_sim.scene.labels import full_name, labelled
 from scalpel_sim.scene.materials import given_in, material_in, material_of, naming_table
 from scalpel_sim.scene.schema import (
@@ -59,6 +60,9 @@ material is given. Its toughness / Young's modulus is 2 mm, the length by which 
 the tissue along before it parts. That must be small against the body, or the blade drags the body
 along instead of cutting it."""
 
+_Part = int | str | tuple[int | str, int | str] | None
+"""A label, None for all others, or two labels with a layer between them."""
+
 
 class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """A scene, as its file has it. Lengths in metres, tissue frame.
@@ -81,6 +85,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """The material; a soft gel without."""
     labels: tuple[LabelTable, ...] = field(default=(), name="label")
     """Parts of the body, each with a name, and with a material of its own."""
+    interfaces: tuple[InterfaceTable, ...] = field(default=(), name="interface")
+    """Layers between parts of the body, along which it dissects."""
     blade_table: BladeTable = field(default_factory=BladeTable, name="blade")
     """The blade; a scalpel without."""
     world: WorldTable = field(default_factory=WorldTable)
@@ -113,6 +119,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_arm(self.arm, self.world)
         _ = self.materials
         check_rows("label", self.labels, check_label)
+        check_interfaces(self.interfaces)
         check_rows("attachment", self.attachments, check_attachment)
         check_rows("support", self.supports, check_support)
         check_rows("grasper", self.graspers, check_grasper)
@@ -170,6 +177,18 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         found = (materials,) if isinstance(materials, Material) else materials.values()
         return tuple(dict.fromkeys(found))
 
+    @property
+    def materials_and_layers(self) -> Material | dict[_Part, Material | float]:
+        """The materials, and the toughness of layers between two labels [J/m2], for the tissue."""
+        materials = self.materials
+        if isinstance(materials, Material) and not self.interfaces:
+            return materials
+        found: dict[_Part, Material | float] = {None: self.material}
+        if not isinstance(materials, Material):
+            found.update(materials.items())
+        found.update((row.between, row.toughness) for row in self.interfaces)
+        return found
+
     def material_of_body(self, body: OneOfBodiesTable) -> Material:
         """Return the material of one of several bodies."""
         return material_in(f"[[body]] '{body.name}'", body.material, self._usual_material)
@@ -203,7 +222,9 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
 
     @cached_property
     def _labelled_mesh(self) -> TetrahedralMesh:
-        return labelled(mesh_of_bodies(self.body), self.labels, self.bodies)
+        mesh = labelled(mesh_of_bodies(self.body), self.labels, self.bodies)
+        expect_parts(mesh, self.interfaces)
+        return mesh
 
     def held_nodes(self) -> BoolArray:
         """Return which nodes of the mesh are held, shape (n_nodes,).
@@ -242,6 +263,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "about": self.about,
             "material": self.material.as_keys(),
             "labels": [self._settings_of_label(row) for row in self.labels],
+            "interfaces": [given_in(row) for row in self.interfaces],
             "bodies": [self._settings_of_body(body) for body in self.bodies],
             "fixed": None if isinstance(self.body, tuple) else self.body.fixed,
             "cut": asdict(self.cut),

@@ -80,6 +80,7 @@ TwoShares = Annotated[
     tuple[Share, Share], Meta(description="two numbers from 0 to 1: [begin, end]")
 ]
 Whole = Annotated[int, Meta(ge=1, le=10_000, description="a whole number from 1 to 10000")]
+TwoLabels = Annotated[tuple[Label, Label], Meta(description='two names: ["fat", "skin"]')]
 LabelNumber = Annotated[int, Meta(ge=0, le=2**31 - 1, description="a whole number of at least 0")]
 Every = Annotated[
     int,

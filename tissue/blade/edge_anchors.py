@@ -27,6 +27,7 @@ from tissue.core.vec3 import Vec3, axpy, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import interpolate
 from tissue.material import Material
 from tissue.mesh.body import Body
+from tissue.mesh.interfaces import NO_LAYER
 
 ANCHOR_STIFFNESS = 4.0
 """Stiffness of an anchor per Young's modulus and length of edge, at least. It stands for the tissue
@@ -107,6 +108,11 @@ class Anchors(Arrays):
     """Stiffness of the springs per length of edge in the first material [Pa]."""
     relative: FloatArray
     """`ToughnessLaw.relative` of the tissue that each anchor is in, shape (n, 4)."""
+    layer: IntArray
+    """Row of `Interfaces` of the layer that each sample follows, or NO_LAYER; shape (n,)."""
+    layer_cosine: FloatArray
+    """Cosine of the angle between that layer and the blade; 0 as long as the cut is on its way to
+    the layer; shape (n,)."""
     sheets: BodySheets
     """The sheet that each sample holds, of its run of samples (`find_sheets`)."""
 
@@ -166,6 +172,8 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         spacing=float(spacing),
         modulus=float(stiffness),
         relative=np.ones((n, 4)),
+        layer=np.full(n, NO_LAYER),
+        layer_cosine=np.ones(n),
         sheets=new_body_sheets(n),
     )
 
@@ -246,29 +254,6 @@ def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
     if anchors.at_skin[k]:
         return share * skin_toughness_of(law, relative, k, toughening)
     return share * toughness_of(law, relative, k, toughening)
-
-
-@kernel
-def is_in_other_material(anchors: Anchors, body: Body, law: ToughnessLaw) -> bool:
-    """Return whether an anchor has come into tissue of another material."""
-    if len(law.relative) == 1:
-        return False
-    for k in range(len(anchors.state)):
-        if anchors.state[k] != FREE:
-            row = body.material[anchors.tetrahedron[k]]
-            for i in range(4):
-                if anchors.relative[k, i] != law.relative[row, i]:
-                    return True
-    return False
-
-
-@kernel
-def take_material(anchors: Anchors, body: Body, law: ToughnessLaw, k: int) -> None:
-    """Write the numbers of the material that anchor `k` is in."""
-    row = body.material[anchors.tetrahedron[k]]
-    for i in range(4):
-        anchors.relative[k, i] = law.relative[row, i]
-    anchors.stiffness[k] = anchor_modulus(anchors, k) * anchors.length[k]
 
 
 @inlined

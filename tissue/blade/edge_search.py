@@ -5,6 +5,7 @@ is anchored as far behind the blade as its neighbour. In an existing slit neithe
 left to cut there. A sample that backed off and then went elsewhere is freed.
 """
 
+from tissue.blade.anchor_materials import take_material
 from tissue.blade.blade_state import BladeState
 from tissue.blade.body_sheets import join_sheet, rotation_of_sheet
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
@@ -17,7 +18,6 @@ from tissue.blade.edge_anchors import (
     begin_account,
     pulling_point,
     stored_energy,
-    take_material,
 )
 from tissue.blade.material_frame import find_sheets, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
@@ -33,6 +33,7 @@ from tissue.geometry.tetrahedron import (
     normalised,
 )
 from tissue.mesh.body import CUT, Body
+from tissue.mesh.interfaces import NO_LAYER
 from tissue.mesh.point_location import tetrahedra_along
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import TetrahedronGrid
@@ -243,6 +244,7 @@ def _begin_anchor(blade: BladeState, body: Body, k: int, t: int, p: Vec3, at_ski
     anchors = blade.anchors
     anchors.coarse.share[k] = 0.0
     set_anchor(anchors, body, k, t, p)
+    anchors.layer[k] = NO_LAYER
     take_material(anchors, body, blade.toughness, k)
     anchors.slipped[k] = False
     anchors.is_new[k] = True

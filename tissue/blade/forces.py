@@ -1,15 +1,14 @@
 """The blade's forces on the nodes, slip after a step, stiffness, and mass scaling at the blade."""
 
+from tissue.blade.anchor_materials import is_in_other_material, take_material
 from tissue.blade.blade_state import BladeState, clear_impulses
 from tissue.blade.edge import Edge, is_sound, motion_at, pose_at
 from tissue.blade.edge_anchors import (
     ANCHORED,
     anchors_energy,
     holding_node,
-    is_in_other_material,
     measure_toughening,
     n_holding_nodes,
-    take_material,
 )
 from tissue.blade.edge_forces import (
     add_anchor_stiffness,

@@ -26,7 +26,11 @@ from tissue.blade.forces import release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.spine_contact import new_spine_contacts
 from tissue.blade.spine_search import relocate_spine
-from tissue.blade.toughness import toughness_law_of, toughness_of_materials
+from tissue.blade.toughness import (
+    blunt_toughness,
+    toughness_law_of,
+    toughness_of_materials,
+)
 from tissue.blade.wrench import contacts_of, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
@@ -104,6 +108,7 @@ class BladeInteraction:
                 skin_toughness=float(skin[0]),
                 exponent=materials.toughness_exponent,
                 doubling_speed=materials.toughness_speed,
+                blunt=blunt_toughness(materials, self._shape),
                 relative=relative_numbers(*numbers),
             ),
             sides=self.state.sides.replaced(

@@ -10,6 +10,7 @@ from tissue.blade.blade_state import BladeState
 from tissue.blade.body_sheets import join_sheet, rotation_of_sheet
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement
 from tissue.blade.edge_anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
+from tissue.blade.layer_following import follow_layers, shift_to_layers
 from tissue.blade.material_frame import find_sheets, rest_offset
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
@@ -80,7 +81,12 @@ def trace_path(
         if path.member[k]:
             _begin_or_go_on(blade, body, k, margin, path)
     average_directions(path, blade.reach)
+    has_layers = len(body.interfaces.toughness) > 0
+    if has_layers:
+        follow_layers(blade, body, path)
     shift_ends(path, body, blade.reach)
+    if has_layers:
+        shift_to_layers(path)
     for k in range(n):
         path.known[k] = path.member[k]
         if anchors.sheets.first[k] == k and anchors.sheets.has_left[k]:
@@ -188,6 +194,7 @@ def forget_path(path: Path) -> None:
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False
+        path.aside[k] = 0.0
         store(path.shift, k, Vec3(0.0, 0.0, 0.0))
 
 

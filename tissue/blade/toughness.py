@@ -37,6 +37,9 @@ class ToughnessLaw(Arrays):
     doubling_speed: FloatArray
     """Speed at which the toughness of each is twice that of a slow cut [m/s], shape
     (n_materials,)."""
+    blunt: FloatArray
+    """The part of the toughness of each material that the radius of the edge adds [J/m2], shape
+    (n_materials,)."""
     relative: FloatArray
     """Numbers of each material of the body over those of the first, shape (n_materials, 4):
     toughness, skin toughness, stiffness of anchors, and of blunt sides (`TOUGHNESS` and so on)."""
@@ -55,16 +58,22 @@ def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessL
         skin_toughness=float(max(material.skin_toughness, material.toughness) + blunt),
         exponent=np.array([float(material.toughness_exponent)]),
         doubling_speed=np.array([float(material.toughness_speed)]),
+        blunt=np.full(1, blunt),
         relative=np.ones((1, 4)),
     )
+
+
+def blunt_toughness(materials: MaterialArrays, shape: BladeShape | None) -> FloatArray:
+    """Return what the radius of the edge adds to the toughness of each material [J/m2]."""
+    layer = 0.0 if shape is None else 2.0 * shape.edge_radius
+    return layer * materials.work_to_rupture
 
 
 def toughness_of_materials(
     materials: MaterialArrays, shape: BladeShape | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return toughness and skin toughness of each material for this edge [J/m2]."""
-    layer = 0.0 if shape is None else 2.0 * shape.edge_radius
-    blunt, toughness = layer * materials.work_to_rupture, materials.toughness
+    blunt, toughness = blunt_toughness(materials, shape), materials.toughness
     return toughness + blunt, np.maximum(materials.skin_toughness, toughness) + blunt
 
 

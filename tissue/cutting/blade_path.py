@@ -44,6 +44,10 @@ class Path(Arrays):
     shift: FloatArray = sized("samples", 3)
     """By how much `t1` is shifted from where the edge was traced [m], shape (n, 3): the ends make
     good what opened beyond their paths (`tissue.cutting.end_depth`)."""
+    aside: FloatArray = sized("samples")
+    """The part of `shift` along `sideways` by which the cut follows a layer [m], shape (n,)."""
+    aside_before: FloatArray = sized("samples")
+    """The same in the step before [m], shape (n,)."""
     shift_t0: FloatArray = sized(2, 3)
     """By how much `t0` of the tip and of the heel are shifted [m], shape (2, 3)."""
     excess: FloatArray = sized(2)

@@ -19,6 +19,7 @@ from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import Lattice, lattice_around
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.material import Material
+from tissue.mesh.interfaces import Interfaces, no_interfaces
 from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.nonconforming import HANGING, SMALL_FACES, Hanging, grown_hanging, nothing_hanging
 from tissue.types import TetrahedralMesh
@@ -83,6 +84,8 @@ class Body(Arrays):
     """Faces of two sizes that meet; empty unless the paper's scheme cuts."""
     materials: MaterialArrays
     """What tetrahedra are made of."""
+    interfaces: Interfaces
+    """Layers between labels."""
 
 
 def build_links(tetrahedra: IntArray) -> IntArray:
@@ -113,6 +116,7 @@ def build_body(
     fixed: BoolArray | None,
     materials: MaterialArrays | None = None,
     material: IntArray | None = None,
+    interfaces: Interfaces | None = None,
 ) -> Body:
     """Return the body of a mesh.
 
@@ -122,6 +126,7 @@ def build_body(
         fixed: Which of them do not move, shape (n_nodes,); None is none.
         materials: What it is made of; None is the usual material.
         material: Row of each tetrahedron in that table, shape (n_tets,); None is the first.
+        interfaces: Layers between its labels; None for none.
     """
     rest = np.ascontiguousarray(mesh.positions, dtype=np.float64)
     tetrahedra = np.ascontiguousarray(mesh.tetrahedra, dtype=np.int64)
@@ -145,6 +150,7 @@ def build_body(
         hanging=nothing_hanging(),
         material=np.zeros(len(tetrahedra), np.int64) if material is None else material.copy(),
         materials=MaterialArrays.of([Material()], [0]) if materials is None else materials,
+        interfaces=no_interfaces() if interfaces is None else interfaces,
     )
 
 

@@ -13,7 +13,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.solver_settings import SolverSettings
 
-STATE_FORMAT = 9
+STATE_FORMAT = 10
 """Number of the form of a state in bytes. It rises where the form changes."""
 
 _FREE = ("solver.threads",)
@@ -74,6 +74,9 @@ class Identity(NamedTuple):
         for label, material in materials.items():
             name = "material" if len(materials) == 1 else f"material of label {label}"
             settings |= {f"{name}.{key}": repr(each) for key, each in material.as_keys().items()}
+        layers = body.interfaces
+        for (low, high), toughness in zip(layers.label.tolist(), layers.toughness, strict=True):
+            settings[f"toughness between labels {low} and {high}"] = repr(float(toughness))
         settings |= {name: value for part in parts.items() for name, value in _flat(*part)}
         for name in _FREE:
             del settings[name]

@@ -26,6 +26,7 @@ from tissue.integrators.methods import (
 from tissue.integrators.model import Numerics, TissueModel
 from tissue.material import warn_of_ratio
 from tissue.mesh.body import build_body
+from tissue.mesh.interfaces import Interfaces
 from tissue.solver_settings import ELEMENTS, PRECISIONS, SolverSettings
 from tissue.stepping.energy_audit import Audit
 from tissue.stepping.stages import StepStages
@@ -37,7 +38,7 @@ def assembled(
     fixed: BoolArray | None,
     positions: FloatArray | None,
     gravity: Sequence[float],
-    materials: BodyMaterials,
+    parts: tuple[BodyMaterials, Interfaces],
     blade: BladeShape | None,
     floor: float | None,
     solver: SolverSettings,
@@ -49,7 +50,7 @@ def assembled(
         fixed: The supports, shape (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3).
         gravity: Acceleration of free fall [m/s2].
-        materials: What the body is made of.
+        parts: What the body is made of, and the layers between its labels.
         blade: The body of the blade.
         floor: Height of a floor below the body [m].
         solver: How the body is cut and moved.
@@ -57,6 +58,7 @@ def assembled(
     Raises:
         ValueError: an argument does not fit the mesh, or is not finite.
     """
+    materials, interfaces = parts
     material = materials.reference
     options = _checked_solver(solver, materials)
     weight = _gravity(gravity)
@@ -66,8 +68,10 @@ def assembled(
         _fixed(fixed, len(mesh.positions)),
         materials.table,
         materials.rows,
+        interfaces,
     )
     if solver.scheme == "paper":
+        _expect_no_layers(interfaces)
         from tissue.cutting.bielser_1998.mesh_records import with_room_to_hang
 
         body = with_room_to_hang(body)
@@ -97,6 +101,19 @@ def assembled(
         Audit(is_kept=solver.audit),
         EXPLAINED * solver.cut.floor * node_size,
     )
+
+
+def _expect_no_layers(interfaces: Interfaces) -> None:
+    """Refuse layers between labels, of which the scheme of the paper knows nothing.
+
+    Raises:
+        ValueError: there is one.
+    """
+    if len(interfaces.toughness):
+        raise ValueError(
+            "scheme='paper' cuts along the path of the blade, and follows no layer between two "
+            "labels. Use scheme='stellar', or leave the layer out: the labels are then bonded"
+        )
 
 
 def _gravity(gravity: Sequence[float]) -> Vec3:

@@ -138,3 +138,59 @@ def test_labels_of_a_file_that_nothing_uses_are_said(tmp_path, caplog):
     body = BodyOptions(mesh=tmp_path / "two.vtu")
     check_scene(chosen_scene(None, TissueOptions(body=body)))
     assert "labels, and the body is of one material: 0 of 192 tetrahedra, 1 of 192" in caplog.text
+
+
+TWO_PARTS = """
+[body]
+shape = "block"
+cells = [8, 8, 4]
+size = [0.04, 0.04, 0.02]
+fixed = "left,right"
+[material]
+law = "neo_hookean"
+young_modulus = 30e3
+toughness = 100.0
+[[label]]
+name = "liver"
+region = "0,0,0:0.02,0.04,0.02"
+[[label]]
+name = "gallbladder"
+region = "0.02,0,0:0.04,0.04,0.02"
+[[interface]]
+between = ["liver", "gallbladder"]
+toughness = 10.0
+[[stroke]]
+kind = "straight"
+speed = 0.1
+"""
+
+AGAIN = '[[interface]]\nbetween = ["gallbladder", "liver"]\ntoughness = 1.0\n'
+
+
+def test_a_run_says_how_much_of_a_layer_is_dissected(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(TWO_PARTS)
+    out = tmp_path / "out"
+    assert command_line(["run", str(tmp_path / "scene.toml"), "--out", str(out)]) == EXIT_OK
+    assert "liver and gallbladder" in capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    (layer,) = summary["interfaces"]
+    assert layer["area_m2"] == pytest.approx(0.04 * 0.02, rel=1e-9)
+    assert layer["cut_area_m2"] == pytest.approx(summary["cut_area_m2"], rel=1e-9)
+    assert summary["settings"]["interfaces"][0]["toughness"] == 10.0
+    assert summary["work_of_blade_j"] == pytest.approx(10.0 * 0.04 * 0.02, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"gallbladder"]', '"liver"]', "number 1 is between 'liver' and itself"),
+        ('"gallbladder"]', '"fat"]', "the body has no part 'fat'"),
+        ("toughness = 10.0", "toughness = -1.0", "toughness"),
+        ("[[stroke]]", f"{AGAIN}[[stroke]]", "the second one between"),
+        ("0.02,0,0:", "0.03,0,0:", "share a face"),
+    ],
+)
+def test_an_interface_that_cannot_be_is_refused(tmp_path, capsys, old, new, message):
+    (tmp_path / "scene.toml").write_text(TWO_PARTS.replace(old, new))
+    assert command_line(["run", str(tmp_path / "scene.toml")]) == EXIT_WRONG_USE
+    assert message in capsys.readouterr().err
