@@ -80,14 +80,18 @@ def read_one(case: int, folder: str) -> str:
 
     In three cases of four a good file is damaged; in the others a broken mesh is written.
     """
+    random = np.random.default_rng(case)
+    if random.random() < 0.75:
+        return _read(_damaged_file(random, _good_files()), folder)
+    return _read(_file_of_a_broken_mesh(random), folder)
+
+
+def _read(file: tuple[str, bytes, int], folder: str) -> str:
+    """Read a damaged file: its name, its bytes, and how many tetrahedra it has."""
+    name, data, n_tetrahedra = file
     said = _Said()
     logging.getLogger("tissue").handlers = [said]
     logging.getLogger("tissue").propagate = False
-    random = np.random.default_rng(case)
-    if random.random() < 0.75:
-        name, data, n_tetrahedra = _damaged_file(random)
-    else:
-        name, data, n_tetrahedra = _file_of_a_broken_mesh(random)
     path = Path(folder) / name
     for other, good in TETGEN.items():
         (Path(folder) / other).write_bytes(good)
@@ -103,6 +107,31 @@ def read_one(case: int, folder: str) -> str:
     n, is_said = len(mesh.tetrahedra), any("left out" in each for each in said.messages)
     assert n >= n_tetrahedra or is_said, f"{n} of {n_tetrahedra} tetrahedra are left of {name}"
     return READ
+
+
+FORMATS = {
+    "Gmsh": (".msh",),
+    "VTK legacy": (".vtk",),
+    "VTU": (".vtu",),
+    "Medit": (".mesh", ".meshb"),
+    "TetGen": (".node", ".ele"),
+    "Abaqus": (".inp",),
+    "Nastran": (".bdf",),
+}
+"""Suffixes of the files of each format."""
+
+
+def read_one_of_a_format(case: int, folder: str) -> str:
+    """Damage a good file of one format after another and read it, as `read_one` does."""
+    random = np.random.default_rng(case)
+    suffixes = FORMATS[format_of(case)]
+    files = [each for each in _good_files() if each[0].endswith(suffixes)]
+    return _read(_damaged_file(random, files), folder)
+
+
+def format_of(case: int) -> str:
+    """Return the format of a case."""
+    return list(FORMATS)[case % len(FORMATS)]
 
 
 class _Said(logging.Handler):
@@ -139,8 +168,9 @@ def _good_files() -> list[tuple[str, bytes, int]]:
     return files
 
 
-def _damaged_file(random: np.random.Generator) -> tuple[str, bytes, int]:
-    files = _good_files()
+def _damaged_file(
+    random: np.random.Generator, files: list[tuple[str, bytes, int]]
+) -> tuple[str, bytes, int]:
     name, data, n_tetrahedra = files[random.integers(len(files))]
     good = data
     for _ in range(random.integers(1, 5)):
