@@ -11,6 +11,7 @@ from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
 from .io.mesh_io import read_mesh_file as read_mesh_file
+from .io.mesh_report import likely_unit as likely_unit
 from .io.whole_file import new_whole_file as new_whole_file
 from .io.whole_file import remove_unfinished as remove_unfinished
 from .io.whole_file import whole_file as whole_file
@@ -34,6 +35,7 @@ __all__ = [
     "cache_directory",
     "components",
     "is_compiling",
+    "likely_unit",
     "kernel",
     "n_compiled_kernels",
     "new_whole_file",

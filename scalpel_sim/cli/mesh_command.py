@@ -33,8 +33,7 @@ class MeshOptions:
     edge_length: float | None = None
     "Length of the edges of tetrahedra [m; default: so that there are some 5,000]."
     tolerance: float | None = None
-    """Farthest that a surface may move [m; default: half a percent of the body's size, less where
-    it is thin]."""
+    "Farthest that a surface may move [m; default: half a percent of the body's size]."
     coarsen: Flag = False
     "Make as few tetrahedra as the tolerance allows, of a surface."
     keep_labels: str | None = None

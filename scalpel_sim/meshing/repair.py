@@ -1,5 +1,6 @@
 """A tetrahedral mesh that cannot be cut as it is becomes one that can."""
 
+import contextlib
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from scalpel_sim.meshing.filling import Filled, fill
 from scalpel_sim.meshing.limited_process import ProcessLimits
 from scalpel_sim.meshing.mended_mesh import REPAIRED_QUALITY, mended_mesh
 from scalpel_sim.meshing.meshed import Meshed
+from scalpel_sim.meshing.old_labels import with_old_labels
 from scalpel_sim.meshing.sizes import edge_for
 from scalpel_sim.meshing.units import scale_of
 
@@ -40,8 +42,8 @@ def repaired(
     """Return a tetrahedral mesh of a file, with a quality of `REPAIRED_QUALITY` at least.
 
     Nodes in the same place are merged, and bad tetrahedra are mended where they are. Where they are
-    many, or that does not suffice, the skin is filled anew; labels would be lost by that, so a mesh
-    with several is as good then as mending makes it.
+    many, or that does not suffice, the skin is filled anew; labels are those of the old tetrahedra
+    in the same places.
 
     Args:
         path: The file, of a kind that `tissue.read_mesh` reads.
@@ -75,24 +77,13 @@ def repaired(
         *found.remarks,
         f"quality was {shape.min():.2g} at least, {np.median(shape):.2f} median",
     ]
-    has_labels = mesh.labels is not None and len(np.unique(mesh.labels)) > 1
-    if (
-        edge_length is None
-        and not coarsen
-        and (has_labels or (shape < REPAIRED_QUALITY).mean() <= MOST_BAD)
-    ):
-        on_progress(f"mending {int((shape < REPAIRED_QUALITY).sum())} tetrahedra")
-        try:
+    is_bad = shape < REPAIRED_QUALITY
+    if edge_length is None and not coarsen and is_bad.mean() <= MOST_BAD:
+        on_progress(f"mending {int(is_bad.sum())} tetrahedra")
+        with contextlib.suppress(MeshError):
             made = mended_mesh(mesh, size)
-        except MeshError:
-            if has_labels:
-                raise
-        else:
-            lowest = quality(made.mesh.positions, made.mesh.tetrahedra).min()
-            if lowest >= REPAIRED_QUALITY or has_labels:
+            if quality(made.mesh.positions, made.mesh.tetrahedra).min() >= REPAIRED_QUALITY:
                 return Meshed(made.mesh, (*notes, *made.notes))
-    if has_labels:
-        raise UsageError(f"{path}: a mesh with labels is not filled anew; omit --edge-length")
     length = edge_length or edge_for(_mean_volume(mesh))
     return _filled_anew(
         mesh,
@@ -129,4 +120,5 @@ def _filled_anew(
         skin.remove_unreferenced_vertices()
         skin.export(Path(folder) / "skin.obj", digits=12)
         made = filled(Path(folder) / "skin.obj")
-    return Meshed(made.mesh, (*notes, "filled the skin anew", *made.notes()))
+    new, taken = with_old_labels(made.mesh, mesh)
+    return Meshed(new, (*notes, "filled the skin anew", *made.notes(), *taken))

@@ -69,6 +69,10 @@ class FileSurface(NamedTuple):
         """Return the mean thickness [m]: that of a wide plate, two thirds of a ball's radius."""
         return 2.0 * self.volume() / max(self.area(), _TINY)
 
+    def is_closed(self) -> bool:
+        """Return whether it has no open edge, and its triangles face one way."""
+        return not _open_edges(self.triangles)[0] and _face_one_way(self.triangles)
+
     def _area_vectors(self) -> FloatArray:
         """Return the normal of each triangle, as long as its area."""
         a, b, c = self.vertices[self.triangles].swapaxes(0, 1)

@@ -32,6 +32,14 @@ def hollow():
     return both(ball(), inner)
 
 
+def pressed_flat():
+    """A ball pressed to a disc whose rim is a cusp, of which a mesher rounds more than it says."""
+    mesh = ball(fineness=3)
+    share = mesh.vertices[:, 2] / 0.05
+    mesh.vertices[:, 2] = 0.01 * np.sign(share) * share**2
+    return mesh
+
+
 def inside_out():
     mesh = ball()
     mesh.invert()

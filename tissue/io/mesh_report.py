@@ -13,8 +13,8 @@ from tissue.mesh.pieces import components
 from tissue.mesh.validation import examined, quality, signed_volumes
 from tissue.types import TetrahedralMesh
 
-LEAST_EXTENT, LARGEST_EXTENT = 3e-3, 1.0
-"""Extents between which a body for surgery is [m]: a vessel, and a trunk."""
+USUAL_EXTENTS = (2e-3, 1.0)
+"""Extents between which a body for surgery is [m]: a biopsy, and a trunk."""
 
 _UNITS = (1.0, 1e-3, 1e-6)
 """Metres in the units that files have, in the order in which they are guessed: m, mm, um."""
@@ -98,7 +98,8 @@ def report_on_mesh(path: str | os.PathLike[str], scale: float | None = None) -> 
     used = mesh.positions[nodes[(nodes >= 0) & (nodes < len(mesh.positions))]]
     with np.errstate(over="ignore", invalid="ignore"):
         box = np.array([used.min(axis=0), used.max(axis=0)]) if len(used) else np.zeros((2, 3))
-        metres = _guessed_scale(float((box[1] - box[0]).max())) if scale is None else scale
+        extent = float((box[1] - box[0]).max())
+        metres = (likely_unit(extent) or _UNITS[0]) if scale is None else scale
         box *= metres
     remarks, fault, shape = found.remarks, None, None
     try:
@@ -113,10 +114,18 @@ def report_on_mesh(path: str | os.PathLike[str], scale: float | None = None) -> 
     )
 
 
-def _guessed_scale(extent: float) -> float:
-    """Return the unit [m] in which a body of that extent is of a size for surgery, else 1."""
-    fitting = [unit for unit in _UNITS if LEAST_EXTENT <= unit * extent <= LARGEST_EXTENT]
-    return (fitting or [_UNITS[0]])[0]
+def likely_unit(extent: float) -> float | None:
+    """Return the unit [m] of a file that does not name one, by what is in it.
+
+    Args:
+        extent: Largest side of the box around the body, in that unit.
+
+    Returns:
+        The first of metres, millimetres and micrometres in which the body is of a size for surgery;
+        None where it is in none of them.
+    """
+    low, high = USUAL_EXTENTS
+    return next((unit for unit in _UNITS if low <= unit * extent <= high), None)
 
 
 def _shape(mesh: TetrahedralMesh) -> MeshShape:

@@ -7,11 +7,13 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE, RunError, UsageError
 from scalpel_sim.meshing.filling import fill
 from scalpel_sim.meshing.limited_process import ProcessLimits, limited_process
+from scalpel_sim.meshing.sizes import TOLERANCE_OF_SIZE
 from tests.support import surfaces
 from tissue import read_mesh
 from tissue.mesh.faces import boundary_faces
@@ -47,6 +49,21 @@ def test_a_ball_is_filled_within_the_tolerance(tmp_path):
 def test_a_bad_surface_becomes_a_sound_mesh(name, tmp_path):
     mesh = filled(surfaces.FILLED[name](), tmp_path, edge_length=COARSE).mesh
     assert quality(mesh.positions, mesh.tetrahedra).min() > 0.1
+
+
+def test_a_rim_that_the_mesher_rounds_is_filled_again_until_it_is_kept(tmp_path):
+    made = filled(surfaces.pressed_flat(), tmp_path, edge_length=COARSE)
+    assert made.moved <= made.bound == TOLERANCE_OF_SIZE * made.surface.size()
+    assert made.sizes.tolerance < made.bound  # the envelope of the mesher had to be closer
+    rim = made.surface.vertices[np.abs(made.surface.vertices[:, 2]) < 1e-6]
+    skin = trimesh.Trimesh(made.mesh.positions, boundary_faces(made.mesh.tetrahedra))
+    places = skin.sample(100_000, seed=0)
+    assert cKDTree(places).query(rim)[0].max() < 1.2 * made.bound
+
+
+def test_walls_inside_a_body_of_parts_that_overlap_do_not_count(tmp_path):
+    made = filled(surfaces.FILLED["overlapping"](), tmp_path, edge_length=COARSE)
+    assert made.moved <= made.bound
 
 
 def test_by_itself_a_mesh_has_some_five_thousand_tetrahedra(tmp_path):

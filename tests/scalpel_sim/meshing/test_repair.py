@@ -1,11 +1,13 @@
 """Meshes with bad tetrahedra are repaired, and their surface stays where it was."""
 
 import importlib.util
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.meshing.distinct import distinct
@@ -18,6 +20,7 @@ from tissue import (
     boundary_faces,
     liver_lobe,
     read_mesh,
+    report_on_mesh,
     write_mesh,
 )
 from tissue.mesh.faces import sorted_faces
@@ -26,6 +29,8 @@ from tissue.mesh.validation import quality, signed_volumes
 needs_mesher = pytest.mark.skipif(
     importlib.util.find_spec("pytetwild") is None, reason="the extra `mesh` is not installed"
 )
+REAL_MESHES = os.environ.get("SCALPEL_SIM_TEST_MESHES")
+"""Folder of meshes that others have made."""
 LOBE_SIZE = float(np.linalg.norm(np.ptp(liver_lobe().positions, axis=0)))
 
 
@@ -99,6 +104,51 @@ def test_what_is_there_twice_or_not_used_goes_and_what_winds_otherwise_is_turned
     assert [note.split()[0] for note in notes] == ["dropped", "merged", "dropped", "dropped", "put"]
 
 
+def of_a_grid(seed=0):
+    """Delaunay tetrahedra of a grid that is a little off: many are flat, as four corners are."""
+    random, n = np.random.default_rng(seed), 7
+    points = np.stack(np.meshgrid(*[np.linspace(0.0, 0.05, n)] * 3, indexing="ij"), -1)
+    points = points.reshape(-1, 3)
+    is_inner = (points > 1e-9) & (points < 0.05 - 1e-9)
+    points = points + is_inner * random.normal(0.0, 1e-6, points.shape)
+    return TetrahedralMesh(points, Delaunay(points).simplices)
+
+
+def with_flat_ones(share=0.1, seed=0):
+    """A liver lobe with inner nodes moved onto a face beside them."""
+    random, mesh = np.random.default_rng(seed), liver_lobe()
+    positions = mesh.positions.copy()
+    inner = np.setdiff1d(np.arange(len(positions)), boundary_faces(mesh.tetrahedra))
+    for node in random.permutation(inner)[: int(share * len(inner))]:
+        around = mesh.tetrahedra[(mesh.tetrahedra == node).any(axis=1)]
+        tet = around[random.integers(len(around))]
+        positions[node] = positions[tet[tet != node]].mean(axis=0)
+    return TetrahedralMesh(positions, mesh.tetrahedra)
+
+
+@pytest.mark.parametrize("make", [of_a_grid, with_flat_ones])
+def test_flat_tetrahedra_of_other_meshers_are_mended_in_place(make):
+    before, _ = distinct(make(), 1e-9)
+    size = float(np.linalg.norm(np.ptp(before.positions, axis=0)))
+    assert shape_of(before).min() < 1e-3
+    after = mended_mesh(before, size).mesh
+    assert shape_of(after).min() >= 0.1
+    assert max(farthest(after, before), farthest(before, after)) <= 0.01 * size
+
+
+@needs_mesher
+@pytest.mark.skipif(REAL_MESHES is None, reason="SCALPEL_SIM_TEST_MESHES names no folder")
+def test_real_meshes_have_a_quality_of_a_tenth_and_keep_their_skin():
+    files = sorted(Path(REAL_MESHES or "").glob("*.[mv][st][hk]"))
+    assert files
+    for file in files:
+        unit = report_on_mesh(file).scale
+        before, made = read_mesh(file, unit), repaired(file, scale=unit).mesh
+        size = float(np.linalg.norm(np.ptp(before.positions, axis=0)))
+        assert shape_of(made).min() >= 0.1, file
+        assert max(farthest(made, before), farthest(before, made)) <= 0.01 * size, file
+
+
 @needs_mesher
 def test_a_mesh_of_a_median_quality_of_0_18_is_filled_anew(tmp_path):
     before = shaken(0.004)
@@ -122,3 +172,20 @@ def test_a_mesh_that_run_refuses_is_repaired_and_taken(tmp_path):
     write_mesh(tmp_path / "good.vtu", made.mesh)
     assert shape_of(read_mesh(tmp_path / "good.vtu")).min() >= 0.1
     assert any("mended from a quality of -0.9" in note for note in made.notes)
+
+
+@needs_mesher
+def test_a_mesh_that_is_filled_anew_keeps_its_labels(tmp_path):
+    mesh = shaken(0.004)
+    middle = liver_lobe().positions[mesh.tetrahedra].mean(axis=1)[:, 0]
+    half = np.median(middle)
+    names = {2: "near", 5: "far"}
+    labels = np.where(middle > half, 5, 2)
+    write_mesh(tmp_path / "before.vtu", mesh._replace(labels=labels))
+    made = repaired(tmp_path / "before.vtu")
+    assert "filled the skin anew" in made.notes
+    assert set(np.unique(made.mesh.labels)) == set(names)
+    at = made.mesh.positions[made.mesh.tetrahedra].mean(axis=1)[:, 0]
+    far = np.abs(at - half) > 0.012  # nodes were moved by 4 mm, and an element is 4 mm wide
+    np.testing.assert_array_equal(made.mesh.labels[far], np.where(at > half, 5, 2)[far])
+    assert "volumes of them changed by 2 " in made.notes[-1]
