@@ -57,12 +57,12 @@ class SceneView(NamedTuple):
 
 
 class NamedLabel(NamedTuple):
-    """A label of a body that has a name."""
+    """A label of a body, and its name."""
 
     label: int
     """The label."""
     name: str
-    """Its name."""
+    """Its name; empty if it has none."""
 
 
 class TissueDescription(NamedTuple):
@@ -85,7 +85,7 @@ class TissueDescription(NamedTuple):
     views: tuple[SceneView, ...] = ()
     """Cameras of the scene; the first of them at the start."""
     labels: tuple[NamedLabel, ...] = ()
-    """Names of labels of the body, of those that have one."""
+    """Labels of the body, in order; none of a body with one label that has no name."""
 
 
 class TissueLink(Protocol):
@@ -229,8 +229,14 @@ class InProcessLink:
             self._tissue.blade,
             self._tissue.floor,
             self._views,
-            tuple(NamedLabel(*each) for each in sorted(self._tissue.label_names.items())),
+            self._labels(),
         )
+
+    def _labels(self) -> tuple[NamedLabel, ...]:
+        """Return the labels of the body with their names."""
+        names, present = self._tissue.label_names, sorted(set(self._tissue.labels().tolist()))
+        named = tuple(NamedLabel(label, names.get(label, "")) for label in present)
+        return named if len(named) > 1 or named[0].name else ()
 
     def step(
         self,

@@ -20,6 +20,7 @@ from scalpel_sim.recording.columns import (
     WallTimes,
     columns_of,
     held_group,
+    label_group,
 )
 from scalpel_sim.recording.observations import MaterialSamples, observed, result_at_rest
 from scalpel_sim.recording.recording import Recording
@@ -95,7 +96,8 @@ class Simulation:
         `recording` stays empty, and memory does not grow."""
         self.n_frames = 0
         """Number of frames so far."""
-        self._shared = [*COLUMNS.values(), held_group(len(self.bridge.frame_loads))]
+        labels = label_group(link.describe().labels)
+        self._shared = [*COLUMNS.values(), held_group(len(self.bridge.frame_loads)), labels]
         self._groups: list[ColumnGroup] = []
         self._take_columns()
         self.samples = MaterialSamples()

@@ -1,4 +1,4 @@
-"""Displacement boundary conditions: nodes of sides, boxes, spheres, half-spaces and lists.
+"""Displacement boundary conditions: nodes of sides, boxes, spheres, half-spaces, labels, lists.
 
 All functions return masks of shape (n_nodes,).
 """
@@ -60,6 +60,9 @@ upright. Less, and the sides of a round body would be held as well."""
 _SPHERE = "sphere:"
 """What the text of a sphere begins with."""
 
+_LABEL = "label:"
+"""What the text of a label begins with."""
+
 _ROUNDING = 1e-9
 """Distance from a box, a sphere or a plane at which nodes are on it, in the body's extent."""
 
@@ -73,7 +76,8 @@ def fixed_nodes(
         mesh: The body.
         specification: Sides joined by commas ("left,right"; "underside": all that faces down), or
             the corners of a box in m ("0,0,0:0.01,0.06,0.04"), or centre and radius of a sphere in
-            m ("sphere:0.01,0.03,0.04,0.005"), or "none".
+            m ("sphere:0.01,0.03,0.04,0.005"), or a label of the mesh by name or number
+            ("label:bone", "label:2"), or "none".
         of: A label, by number or name, or one of several bodies (`tissue.joined`), by name: it is
             of that part alone, and its sides; None: all of the mesh.
 
@@ -89,6 +93,8 @@ def fixed_nodes(
         return np.zeros(len(mesh.positions), dtype=bool)
     if text.lower().startswith(_SPHERE):
         return sphere_nodes(mesh, *_centre_and_radius(text))
+    if text.lower().startswith(_LABEL):
+        return label_nodes(mesh, text[len(_LABEL) :].strip())
     if ":" in text:
         return box_nodes(mesh, *_box_corners(text))
     return side_nodes(mesh, text.split(","))
@@ -96,10 +102,11 @@ def fixed_nodes(
 
 def _nodes_of_part(mesh: TetrahedralMesh, specification: str, part: int | str) -> BoolArray:
     """Return a mask of the nodes of a part that a text names: see `fixed_nodes`."""
-    tetrahedra = part_of_mesh(mesh, part).tetrahedra
+    tetrahedra, labels = part_of_mesh(mesh, part)[1:3]
     nodes, own = np.unique(tetrahedra, return_inverse=True)
     found = np.zeros(len(mesh.positions), dtype=bool)
-    alone = TetrahedralMesh(mesh.positions[nodes], own.reshape(tetrahedra.shape))
+    of_part = own.reshape(tetrahedra.shape)
+    alone = TetrahedralMesh(mesh.positions[nodes], of_part, labels, mesh.label_names)
     try:
         found[nodes] = fixed_nodes(alone, specification)
     except ValueError as error:
@@ -163,6 +170,24 @@ def sphere_nodes(mesh: TetrahedralMesh, centre: npt.ArrayLike, radius: float) ->
     return _with_nodes(mask, mesh, f"in the sphere of {radius:.4g} m around {_text(middle)} m")
 
 
+def label_nodes(mesh: TetrahedralMesh, label: int | str) -> BoolArray:
+    """Return a mask of the nodes of the tetrahedra of a label, those on its borders too.
+
+    Args:
+        mesh: The body.
+        label: Number or name, or the name of one of several bodies; digits alone are a number,
+            unless a label has that name.
+
+    Raises:
+        ValueError: No tetrahedron has it.
+    """
+    if isinstance(label, str) and label.isdecimal() and label not in mesh.label_names.values():
+        label = int(label)
+    mask = np.zeros(len(mesh.positions), dtype=bool)
+    mask[part_of_mesh(mesh, label).tetrahedra] = True
+    return mask
+
+
 def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLike) -> BoolArray:
     """Return a mask of the nodes on the plane through `point` [m] and beyond it along `normal`.
 
@@ -210,7 +235,8 @@ def _side(name: str) -> tuple[int, bool]:
         hint = f" Did you mean '{close[0]}'?" if close else ""
         raise ValueError(
             f"'{name.strip()}' is not a side of the body.{hint} Sides: {', '.join(SIDES)}, "
-            f"{UNDERSIDE}; or a box x0,y0,z0:x1,y1,z1 or {_SPHERE}x,y,z,radius in m; or none"
+            f"{UNDERSIDE}; or a box x0,y0,z0:x1,y1,z1 or {_SPHERE}x,y,z,radius in m; or "
+            f"{_LABEL}NAME; or none"
         )
     return SIDES[key]
 

@@ -222,6 +222,10 @@ class StepResult(NamedTuple):
     """Mass that mass scaling has added, at t1."""
     energies: Energies | None
     """Energy balance since the body was made; None without an audit."""
+    cutting_of_labels: FloatArray
+    """`work_of_cutting` in each label of the body, in order [J]; no numbers where it has one."""
+    force_of_labels: FloatArray
+    """Force of each on the edge at t1, against its motion [N]; on no faces, back or ends of it."""
 
     @property
     def contacts_of_blade(self) -> RigidContacts:
@@ -298,15 +302,13 @@ class Surface(NamedTuple):
     is_cut: BoolArray
     """Whether the triangle is a face of a cut rather than skin, shape (n_triangles,)."""
     labels: IntArray | None = None
-    """Label of the tetrahedron that each triangle is a face of, shape (n_triangles,). None: the
-    body has one label."""
+    """Label of the tetrahedron that each triangle is a face of; None where the body has one."""
 
     def part(self, chosen: BoolArray) -> "Surface":
         """Return some of the triangles, shape (n_triangles,), between the same vertices."""
         labels = None if self.labels is None else self.labels[chosen]
-        return self._replace(
-            triangles=self.triangles[chosen], is_cut=self.is_cut[chosen], labels=labels
-        )
+        triangles, is_cut = self.triangles[chosen], self.is_cut[chosen]
+        return self._replace(triangles=triangles, is_cut=is_cut, labels=labels)
 
     def to_trimesh(self) -> "Trimesh":
         """Return the surface as a trimesh mesh [m], tissue frame, with all its pieces.

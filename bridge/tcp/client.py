@@ -118,7 +118,7 @@ class TcpLink:
             MessageKind.HELLO, b"", LARGEST_DESCRIPTION, DESCRIPTION.unpack
         )
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
-        self._label_names = dict(description.labels)
+        self._label_names = {each.label: each.name for each in description.labels if each.name}
         return description
 
     def step(

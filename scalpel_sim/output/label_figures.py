@@ -11,6 +11,7 @@ from tissue import FloatArray, Snapshot, piece_of_tetrahedra
 def label_figures(outcome: RunOutcome) -> list[dict[str, Any]]:
     """Return the figures of each label: none of a body without labels, or that was lost.
 
+    Work of cutting and force are those of the edge: null where there is one label, or very many.
     The area cut is that by which its outside at rest has grown, one side of each cut. A cut along
     the border of two parts is half of each.
     """
@@ -24,6 +25,7 @@ def label_figures(outcome: RunOutcome) -> list[dict[str, Any]]:
     for label in np.unique(first.labels).tolist():
         name, mine = outcome.label_names.get(label), last.labels == label
         cut = 0.5 * (after[label] - before[label])
+        work, force = outcome.recording.of_label(label) or (None, None)
         found.append(
             {
                 "label": label,
@@ -32,6 +34,8 @@ def label_figures(outcome: RunOutcome) -> list[dict[str, Any]]:
                 "volume_m3": float(volumes[mine].sum()),
                 "cut_area_m2": max(cut, 0.0) if cut > _ROUNDING * after[label] else 0.0,
                 "pieces": len(np.unique(piece[mine])),
+                "work_of_cutting_j": work,
+                "edge_force_peak_n": force,
             }
         )
     return found

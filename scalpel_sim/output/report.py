@@ -87,15 +87,18 @@ def _labels(summary: Summary) -> Table:
     """Return the figures of the labelled parts of the body as a table."""
     table = Table(title="parts of the body", title_justify="left")
     table.add_column("label", style="bold")
-    for name in ("volume", "cut area", "pieces"):
+    for name in ("volume", "cut area", "pieces", "work of cutting", "peak force on the edge"):
         table.add_column(name, justify="right")
     for row in summary.labels:
         name = row["name"] or (f"{row['label']}" if row["label"] else "the rest")
+        work, force = row["work_of_cutting_j"], row["edge_force_peak_n"]
         table.add_row(
             f"{name} (to spare)" if row["spare"] else name,
             f"{_CM3_PER_M3 * row['volume_m3']:,.3g} cm\u00b3",
             f"{_MM2_PER_M2 * row['cut_area_m2']:,.1f} mm\u00b2",
             f"{row['pieces']}",
+            "" if work is None else f"{_MJ_PER_J * work:.2f} mJ",
+            "" if force is None else f"{force:.3f} N",
         )
     return table
 

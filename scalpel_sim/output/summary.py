@@ -85,8 +85,9 @@ class Summary(NamedTuple):
     """End of each stroke, and its time, where a force or the body could end it: `kind`, `ended`,
     `time_s`, `force_n`."""
     labels: list[dict[str, Any]]
-    """Of each labelled part of the body: `label`, `name`, `spare`, `volume_m3`, `cut_area_m2`, and
-    in how many pieces it is. Empty without labels."""
+    """Of each labelled part of the body: `label`, `name`, `spare`, `volume_m3`, `cut_area_m2`, in
+    how many pieces it is, `work_of_cutting_j`, and `edge_force_peak_n`, the largest force on the
+    edge. Empty without labels."""
     interfaces: list[dict[str, Any]]
     """Of each layer between two parts: `between`, `toughness_j_m2`, `area_m2` at rest, and
     `cut_area_m2`, how much of it is open."""

@@ -154,8 +154,9 @@ def _make_rigid(tissue: Tissue, mesh: TetrahedralMesh, table: CoreTable) -> int:
 def _region(
     mesh: TetrahedralMesh, table: AttachmentTable | CoreTable | LedSupportTable
 ) -> str | BoolArray:
-    """Return the region of a table: as text, or the nodes that are in it and in its body."""
-    return table.where if table.body is None else fixed_nodes(mesh, table.where, table.body)
+    """Return the region of a table: as text; or its nodes, of a body or a label with a name."""
+    is_text = table.body is None and not table.where.strip().lower().startswith("label:")
+    return table.where if is_text else fixed_nodes(mesh, table.where, table.body)
 
 
 def _attached(

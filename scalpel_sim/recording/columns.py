@@ -4,13 +4,14 @@ To add a column, add a `ColumnGroup` to `COLUMNS`: see `docs/extend.md`.
 """
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from bridge import TissueFrame
+from bridge import NamedLabel, TissueFrame
 from tissue import BladeSegment, Energies, FloatArray, RigidContacts, StepResult, Wrench
 from tissue.support import kernel
 
@@ -26,6 +27,9 @@ NaN without an audit."""
 
 WALL_TIMES = ("cd_s", "gc_s", "rx_s", "rd_s", "frame_s", "recording_s")
 """Columns that differ from run to run: what frames took."""
+
+MOST_LABELS = 64
+"""Labels of a body that have columns of their own. In a mesh with more they are no parts."""
 
 _NO_ACCOUNT = (math.nan,) * len(ACCOUNT)
 """The energies of a frame without an audit."""
@@ -126,6 +130,43 @@ def held_group(n: int) -> ColumnGroup:
         return [x for load in loads for x in to_world(load.wrench.force).tolist()]
 
     return ColumnGroup({f"held_{i}": vector_columns(f"held_{i}", "n") for i in range(n)}, forces)
+
+
+def label_group(labels: Sequence[NamedLabel]) -> ColumnGroup:
+    """Return the group of a run through a body of several labels.
+
+    Of one label, and of more than `MOST_LABELS`, it has no columns.
+
+    Of each label the work of cutting in it since the start [J], and its force on the edge against
+    the direction in which that cuts, at the end of the frame [N].
+    """
+    if not 2 <= len(labels) <= MOST_LABELS:
+        return ColumnGroup({}, lambda _: ())
+    names = [_in_column(label) for label in labels]
+
+    def values(frame: FrameData) -> list[float]:
+        result = frame.result
+        return [*result.cutting_of_labels.tolist(), *result.force_of_labels.tolist()]
+
+    return ColumnGroup(
+        {
+            "cutting_of_labels": [f"cutting_{name}_j" for name in names],
+            "force_of_labels": [f"edge_{name}_n" for name in names],
+        },
+        values,
+    )
+
+
+def label_of_column(column: str) -> int | None:
+    """Return the label that a column of `label_group` is of; None: it is of none."""
+    found = re.fullmatch(r"(?:cutting|edge)_(\d+)(?:_\w+)?_[jn]", column, re.ASCII)
+    return None if found is None else int(found[1])
+
+
+def _in_column(label: NamedLabel) -> str:
+    """Return a label as names of columns have it: its number, and letters of its name."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", label.name).strip("_")
+    return f"{label.label}_{name}" if name else f"{label.label}"
 
 
 def grasper_quantities(name: str) -> dict[str, tuple[str, ...]]:

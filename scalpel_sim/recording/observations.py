@@ -179,6 +179,7 @@ def result_at_rest(link: TissueLink) -> StepResult:
     """Return the result of a tissue before its first step: nothing acts, and nothing is cut."""
     body, zero, none = link.describe(), np.zeros(3), np.zeros((0, 3))
     wrench = Wrench(zero, zero, zero)
+    of_labels = np.zeros(len(body.labels) if len(body.labels) > 1 else 0)
     return StepResult(
         wrench=wrench,
         wrench_t1=wrench,
@@ -202,4 +203,6 @@ def result_at_rest(link: TissueLink) -> StepResult:
         stage_times=StageTimes(0.0, 0.0, 0.0),
         added_mass=AddedMass(0.0, zero, zero, zero, zero),
         energies=None,
+        cutting_of_labels=of_labels,
+        force_of_labels=of_labels,
     )

@@ -20,6 +20,7 @@ from scalpel_sim.recording.columns import (
     COLUMNS,
     columns_in,
     grasper_quantities,
+    label_of_column,
     shared_columns,
     vector_columns,
 )
@@ -165,6 +166,17 @@ class Recording:
             if there.issuperset(columns_in(grasper_quantities(name)))
         )
 
+    def of_label(self, label: int) -> tuple[float, float] | None:
+        """Return the work of cutting in a label [J], and its largest force on the edge [N].
+
+        None: the recording has no columns of labels.
+        """
+        own = [name for name in self.columns if label_of_column(name) == label]
+        if not own:
+            return None
+        work, force = own
+        return self.at_end(work), float(self.column(force).max(initial=0.0))
+
     @property
     def is_audited(self) -> bool:
         """Whether the energy account was kept."""
@@ -210,7 +222,8 @@ def _are_of_a_run(columns: Sequence[str]) -> bool:
     """
     there = set(columns)
     quantities = (names for group in COLUMNS.values() for names in group.quantities.values())
-    vectors = (name.split("_x_") for name in columns if "_x_" in name)
+    others = [name for name in columns if label_of_column(name) is None]
+    vectors = (name.split("_x_") for name in others if "_x_" in name)
     wholes = [*quantities, *(vector_columns(*parts) for parts in vectors)]
     is_whole = all(there.issuperset(names) or there.isdisjoint(names) for names in wholes)
     return columns[0] == "time_s" and len(there) == len(columns) and is_whole

@@ -222,7 +222,7 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
         hand.take_over(simulation)
     if outputs.resumption is not None:
         outputs.resumption.load_into(simulation)
-        outputs.write_mesh(INITIAL, run.first, run.first_deformation)  # its size: the space kept
+        _write_initial(run)  # its size: the space kept
         outputs.keep_reserve()
         outputs.remove_earlier_files()
     if scene is not None and hand is not None:
@@ -235,7 +235,7 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
     plan = RunPlan(simulation.dt, text, exports, run.settings, seconds, read)
     outputs.begin_journal(plan)
     if outputs.resumption is None:
-        outputs.write_mesh(INITIAL, run.first, run.first_deformation)
+        _write_initial(run)
         outputs.keep_reserve()
     return plan
 
@@ -331,6 +331,12 @@ def _has_rested(simulation: Simulation, hand: Teleoperation) -> bool:
     # The very number of frames of a run that repeats the stroke.
     n_frames = round((hand.ended_at + REST_AFTER_STROKE) / simulation.dt)
     return len(simulation.recording) >= n_frames
+
+
+def _write_initial(run: OpenRun) -> None:
+    """Write the body as it was at first."""
+    names = run.simulation.link.label_names
+    run.outputs.write_mesh(INITIAL, run.first, run.first_deformation, names)
 
 
 def _repeated(scene: Scene, outputs: Outputs) -> Scene:

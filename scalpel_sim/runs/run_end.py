@@ -160,7 +160,7 @@ def _outcome(run: OpenRun) -> RunOutcome:
     with run.attempts.of(FINAL):
         link = run.simulation.link
         last = link.snapshot()
-        run.outputs.write_mesh(FINAL, last, link.deformation())
+        run.outputs.write_mesh(FINAL, last, link.deformation(), link.label_names)
     if FINAL not in run.attempts.unwritten:
         with run.attempts.of("the quality of the cut"):
             report = run.simulation.link.cut_report()

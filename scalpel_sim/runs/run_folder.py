@@ -3,7 +3,7 @@
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
@@ -146,10 +146,16 @@ class Outputs:
         """Write `scene.toml`."""
         self._write_whole(SCENE, lambda path: path.write_text(text, encoding="utf-8"))
 
-    def write_mesh(self, name: str, snapshot: Snapshot, deformation: Deformation) -> None:
-        """Write the body as `initial.vtu` or `final.vtu`, with its stress and strain."""
+    def write_mesh(
+        self,
+        name: str,
+        snapshot: Snapshot,
+        deformation: Deformation,
+        label_names: Mapping[int, str],
+    ) -> None:
+        """Write the body as `initial.vtu` or `final.vtu`, with its stress, strain and labels."""
         with writing(self.path(name), _INSTEAD):
-            write_vtu(self.path(name), snapshot, deformation)
+            write_vtu(self.path(name), snapshot, deformation, label_names=label_names)
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""

@@ -102,7 +102,8 @@ class HeldBodyTable(BodyTable, kw_only=True, frozen=True, dict=True):
 
     fixed: Region = USUAL_FIXED
     """Part that is held: sides (left, right, front, back, bottom, top), the underside (all that
-    faces down), a box x0,y0,z0:x1,y1,z1 in m, a sphere sphere:x,y,z,radius in m, or none."""
+    faces down), a box x0,y0,z0:x1,y1,z1 in m, a sphere sphere:x,y,z,radius in m, a label label:NAME
+    (or its number), or none."""
     stretch: Finite | None = None
     """Fraction by which opposite held sides are pulled apart before the run: a slit opens.
     0.05 where left and right are held and the file gives none, else 0."""

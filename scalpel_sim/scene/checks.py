@@ -187,7 +187,8 @@ def check_label(table: LabelTable, where: str) -> None:
             f"{where} has label and region; one says which elements it is: label, a number of the "
             "mesh file, or region, a box or a sphere"
         )
-    if table.region is not None and ":" not in table.region:
+    region = table.region
+    if region is not None and (":" not in region or region.lower().startswith("label:")):
         raise UsageError(
             f"{where} has region '{table.region}'; it is a box (\"0,0,0:0.01,0.02,0.03\") or a "
             'sphere ("sphere:0.01,0.02,0.03,0.005")'

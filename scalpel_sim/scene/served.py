@@ -37,7 +37,7 @@ def scene_of(link: TissueLink, scene: Scene | None = None) -> Scene:
         return changed(known, material=body.material, views=views)
     rest = link.snapshot()
     labels = rest.labels if rest.labels.any() else None
-    mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra, labels, dict(body.labels))
+    mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra, labels, link.label_names)
     about = f"the body '{body.scene}'"
     found = Scene(name=body.scene, about=about, body=GivenBody(source=lambda: mesh), views=views)
     return changed(found, material=body.material)

@@ -122,7 +122,7 @@ Region = Annotated[
     Meta(
         min_length=1,
         description='a region: sides ("left,right"; "underside"), a box ("0,0,0:0.01,0.02,0.03") '
-        'or a sphere ("sphere:0.01,0.02,0.03,0.005")',
+        'or a sphere ("sphere:0.01,0.02,0.03,0.005"), or a label ("label:bone")',
     ),
 ]
 if TYPE_CHECKING:

@@ -27,6 +27,10 @@ fixed = "left,right,front"
 [material]
 preset = "gelatin"
 
+[[label]]
+name = "far part"
+region = "0,0.03,0:0.06,0.04,0.01"
+
 [world]
 table = -0.014
 
@@ -68,6 +72,7 @@ def test_a_scene_in_a_file_runs_with_its_tissue_elsewhere_as_it_does_here(path):
     assert command_line([*words, str(there), "--connect", address_of_server(scene)]) == 0
     assert_same_run(here, there)
     theirs = read_forces(there / "forces.csv")
+    assert theirs.column("cutting_0_j")[-1] > 0.0 and theirs.of_label(1)[1] > 0.0
     assert theirs.column("left_points").max() > 0 and theirs.column("cut_area_m2")[-1] > 0.0
     of_hands = [json.loads((each / "summary.json").read_text())["hands"] for each in (here, there)]
     assert of_hands[0] == of_hands[1] and of_hands[0][0]["points_held_most"] > 0

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from tissue import TetrahedralMesh, block, fixed_nodes, liver_lobe
-from tissue.boundary_conditions import SIDES, box_nodes, listed_nodes, plane_nodes, side_nodes
+from tissue.boundary_conditions import (
+    SIDES,
+    box_nodes,
+    label_nodes,
+    listed_nodes,
+    plane_nodes,
+    side_nodes,
+)
 from tissue.mesh.faces import boundary_faces
 
 
@@ -128,3 +135,24 @@ def test_missing_nodes_are_refused_by_number():
         plane_nodes(block(), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     with pytest.raises(ValueError, match="normal of the plane is zero"):
         plane_nodes(block(), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+LABELLED = block((4, 4, 4), (0.04, 0.04, 0.04))
+LABELLED = LABELLED._replace(
+    labels=np.where(LABELLED.positions[LABELLED.tetrahedra].mean(axis=1)[:, 2] > 0.03, 2, 0),
+    label_names={2: "bone, upper"},
+)
+
+
+@pytest.mark.parametrize("text", ["label:bone, upper", " LABEL: bone, upper", "label:2"])
+def test_a_label_holds_all_nodes_of_its_tetrahedra(text):
+    expected = LABELLED.positions[:, 2] > 0.029
+    assert np.array_equal(fixed_nodes(LABELLED, text), expected)
+    assert np.array_equal(label_nodes(LABELLED, 2), expected)
+
+
+def test_a_label_that_is_not_there_is_refused_with_those_that_are():
+    with pytest.raises(ValueError, match=r"no tetrahedron has label 'bon'; there is 0, 2 \('bone"):
+        fixed_nodes(LABELLED, "label:bon")
+    with pytest.raises(ValueError, match="no tetrahedron has label 7; there is 0"):
+        fixed_nodes(block((1, 1, 1)), "label:7")

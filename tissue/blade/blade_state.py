@@ -15,6 +15,7 @@ from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays, FloatCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub
 from tissue.material import Material
+from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR
 
 
@@ -31,6 +32,8 @@ class ImpulseTotals(Arrays):
     """Energy that sliding along the side faces of the blade took [J]."""
     released: FloatCell
     """Stored energy of anchors and contacts that ended, less that of those that began [J]."""
+    cutting_of_labels: FloatArray
+    """`work_of_cutting` in each label of the body [J]; no numbers where it has one."""
     impulse: FloatArray
     """Impulse of the tissue on the blade in this time step [N s], shape (3,)."""
     angular_impulse: FloatArray
@@ -47,6 +50,7 @@ def new_totals() -> ImpulseTotals:
         work_of_breaking=0.0,
         work_of_friction=0.0,
         released=0.0,
+        cutting_of_labels=np.zeros(0),
         impulse=np.zeros(3),
         angular_impulse=np.zeros(3),
         impulse_on_tissue=np.zeros(3),
@@ -69,6 +73,7 @@ def clear_works(totals: ImpulseTotals) -> None:
     totals.work_of_breaking = 0.0
     totals.work_of_friction = 0.0
     totals.released = 0.0
+    totals.cutting_of_labels[:] = 0.0
 
 
 class RunningTotals(NamedTuple):
@@ -195,6 +200,15 @@ class BladeState(Arrays):
     backed off still belongs to its anchor [m]."""
     queue: IntArray
     """Scratch for searches, shape (LARGEST_STAR,)."""
+
+
+@kernel
+def count_cutting(blade: BladeState, body: Body, t: int, work: float) -> None:
+    """Count work of cutting [J] in tetrahedron `t`, in its label too."""
+    totals = blade.totals
+    totals.work_of_cutting += work
+    if len(totals.cutting_of_labels) > 0:
+        totals.cutting_of_labels[blade.toughness.label[body.material[t]]] += work
 
 
 def new_blade_state(

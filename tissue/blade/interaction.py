@@ -102,10 +102,16 @@ class BladeInteraction:
         numbers = (materials, self._material, self._shape, self._node_size)
         stiffest = float(materials.young_modulus.max())
         stiffness = FACE_STIFFNESS * stiffest / self._node_size
+        labels, place = np.unique(materials.label, return_inverse=True)
+        if len(labels) > 1 and not len(self.state.totals.cutting_of_labels):
+            totals = self.state.totals.replaced(cutting_of_labels=np.zeros(len(labels)))
+            self.state = self.state.replaced(totals=totals)
+            self._renew_report()
         self.state = self.state.replaced(
             toughness=self.state.toughness.replaced(
                 toughness=float(toughness[0]),
                 skin_toughness=float(skin[0]),
+                label=place.reshape(-1).astype(np.int64),
                 exponent=materials.toughness_exponent,
                 doubling_speed=materials.toughness_speed,
                 blunt=blunt_toughness(materials, self._shape),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.blade_state import SEARCH, BladeState
+from tissue.blade.blade_state import SEARCH, BladeState, count_cutting
 from tissue.blade.coarse_hold import (
     begin_coarse_hold,
     fade_coarse_hold,
@@ -294,7 +294,7 @@ def _slip_anchor(
     _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane), pose)
     if anchors.state[k] == LEFT:
         anchors.cut[k] += share * surplus * across
-        totals.work_of_cutting += spent
+        count_cutting(blade, body, t, spent)
         totals.released += before - spent
         return
     if anchors.coarse.share[k] > 0.0:  # as a part of the slip: the blade pays for that too
@@ -311,7 +311,7 @@ def _slip_anchor(
     area = across * dot(slipped, in_plane) / distance
     cost = held_toughness(anchors, k, law) * area
     anchors.cut[k] += share * area
-    totals.work_of_cutting += cost
+    count_cutting(blade, body, t, cost)
     totals.work_of_breaking += before - left - cost
     displacement = sub(vec3(anchors.rest, k), rest)
     update_rest_share(anchors, k, displacement, slipped, pose, blade.reach)

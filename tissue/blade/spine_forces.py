@@ -4,6 +4,7 @@ from tissue.blade.blade_state import (
     BladeState,
     add_reaction,
     add_to_node,
+    count_cutting,
     running_totals,
     store_totals,
 )
@@ -146,7 +147,7 @@ def _pierce(
     before = press_energy(spine, k, press_of(spine, k, side, normal, p, law))
     spine.state[k] = PIERCING
     again = press_of(spine, k, side, normal, p, law)
-    toughness = tip_toughness(spine, k, law)
+    toughness, t = tip_toughness(spine, k, law), spine.tetrahedron[k]
     is_inside = _move_by(blade, body, visits, k, scale(again.surplus, side.outward))
     moved = sub(touched_point(spine, body, body.positions, k), p)
     cost = toughness * spine.length[k] * max(dot(moved, side.outward), 0.0)
@@ -158,7 +159,7 @@ def _pierce(
         spine.state[k] = IDLE
         spine.n_pressing -= 1
     spine.energy[k] = left
-    totals.work_of_cutting += cost
+    count_cutting(blade, body, t, cost)
     totals.work_of_breaking += before - left - cost
 
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from tissue.blade_shape import BladeShape
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.material import Material
@@ -43,6 +43,8 @@ class ToughnessLaw(Arrays):
     relative: FloatArray
     """Numbers of each material of the body over those of the first, shape (n_materials, 4):
     toughness, skin toughness, stiffness of anchors, and of blunt sides (`TOUGHNESS` and so on)."""
+    label: IntArray
+    """Place of the label of each material among the labels of the body, shape (n_materials,)."""
 
 
 def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessLaw:
@@ -60,6 +62,7 @@ def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessL
         doubling_speed=np.array([float(material.toughness_speed)]),
         blunt=np.full(1, blunt),
         relative=np.ones((1, 4)),
+        label=np.zeros(1, dtype=np.int64),
     )
 
 

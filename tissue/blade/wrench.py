@@ -66,9 +66,12 @@ class WrenchReport(Arrays):
     """The numbers of `Amounts`."""
     added: FloatArray
     """The numbers of `AddedMass`, shape (13,)."""
+    of_labels: FloatArray
+    """Of each label of the body: work of cutting since the start [J], and force on the edge against
+    its motion [N]; shape (2, n_labels), no numbers where there is one label."""
     plain: FloatArray
     """All but the contacts in plain numbers: mean wrench, tip, wrench, mean force, amounts, bounds,
-    stiffness, added mass."""
+    stiffness, added mass, and what is of labels."""
 
 
 class Amounts(NamedTuple):
@@ -102,7 +105,8 @@ def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
     capacity = (
         n_more + len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.spine.state)
     )
-    plain = np.zeros(ADDED.stop)
+    n_labels = len(blade.totals.cutting_of_labels)
+    plain = np.zeros(ADDED.stop + 2 * n_labels)
     return WrenchReport(
         n_contacts=0,
         point=np.zeros((capacity, 3)),
@@ -118,6 +122,7 @@ def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
         stiffness=plain[STIFFNESS].reshape(6, 6),
         amounts=plain[AMOUNTS],
         added=plain[ADDED],
+        of_labels=plain[ADDED.stop :].reshape(2, n_labels),
         plain=plain,
     )
 
@@ -156,6 +161,9 @@ def write_report(report: WrenchReport, blade: BladeState, body: Body, edge: Edge
         report.wrench[i] = 0.0
         for j in range(6):
             report.stiffness[i, j] = 0.0
+    for i in range(report.of_labels.shape[1]):
+        report.of_labels[0, i] = blade.totals.cutting_of_labels[i]
+        report.of_labels[1, i] = 0.0
     pose = pose_at(edge, 1.0)
     _report_edge(report, blade, body, pose, edge.tip_t1)
     _report_faces(report, blade, body, pose, edge.tip_t1)
@@ -215,6 +223,9 @@ def _report_edge(
         free = scale(1.0 if anchors.slips[k] else 0.0, in_plane)
         _add_stiffness(report, lever, anchors.stiffness[k], free)
         across = dot(force, forward)
+        if report.of_labels.shape[1] > 0:
+            label = blade.toughness.label[body.material[anchors.tetrahedron[k]]]
+            report.of_labels[1, label] += across
         at = sub(b, surplus)  # where the force acts: torques of the contacts add up too
         _add_contact(report, at, forward, across, axpy(-across, forward, force), anchors.cut[k])
 

@@ -23,6 +23,10 @@ LABEL_ARRAYS = (
 """Names of arrays that are labels, in either case. Where there are several, the first counts."""
 
 
+NAMES_FIELD = "label_names"
+"""Field data with the names of labels: bytes of JSON, {"2": "fat"}."""
+
+
 def label_array(names: Iterable[str]) -> str | None:
     """Return which of the arrays of cells is that of their labels; None: none is."""
     by_rank = [(LABEL_ARRAYS.index(n.lower()), n) for n in names if n.lower() in LABEL_ARRAYS]

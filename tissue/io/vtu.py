@@ -5,6 +5,7 @@ Labels are cell data, by the names in `label_arrays`.
 
 import base64
 import binascii
+import json
 import lzma
 import re
 import xml.etree.ElementTree as ET
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader, as_floats, as_ints, shown
+from tissue.io.label_arrays import NAMES_FIELD
 from tissue.io.mesh_file import MeshFile, mesh_file
 from tissue.io.vtk_cells import cell_blocks, labels_among
 from tissue.mesh.mesh_arrays import MeshError
@@ -88,7 +90,8 @@ def read_vtu(data: bytes) -> MeshFile:
     pieces = root.findall("UnstructuredGrid/Piece")
     if len(pieces) != 1:
         raise MeshError(f"expected one <Piece>, found {len(pieces)}: merge them into one grid")
-    return _Piece(pieces[0], _encoding(root, appended), len(data)).file()
+    names = root.find(f"UnstructuredGrid/FieldData/DataArray[@Name='{NAMES_FIELD}']")
+    return _Piece(pieces[0], _encoding(root, appended), len(data)).file(names)
 
 
 def _apart(data: bytes) -> tuple[bytes, bytes]:
@@ -139,7 +142,8 @@ class _Piece:
         self._most = min(MAX_RATIO * n_bytes, MAX_BYTES) // _NUMBER_BYTES
         self._n_numbers = 0
 
-    def file(self) -> MeshFile:
+    def file(self, names: ET.Element | None) -> MeshFile:
+        """Return the grid, with names of labels by an array of bytes, if there is one."""
         n_nodes, n_cells = self._count("NumberOfPoints"), self._count("NumberOfCells")
         positions = self._floats("Points/DataArray", 3 * n_nodes).reshape(n_nodes, 3)
         ends = self._ints("Cells/DataArray[@Name='offsets']", n_cells)
@@ -149,7 +153,22 @@ class _Piece:
         starts = np.concatenate([[0], ends])[:-1]
         labels, said = self._labels(types)
         blocks = cell_blocks(types, starts, ends - starts, flat, labels)
-        return mesh_file("VTK XML", positions, blocks, remarks=said)
+        label_names = {} if names is None else self._names(names)
+        return mesh_file("VTK XML", positions, blocks, label_names=label_names, remarks=said)
+
+    def _names(self, array: ET.Element) -> dict[int, str]:
+        """Return names of labels from the bytes of JSON."""
+        values = self._numbers(array, self._count_in("NumberOfTuples", array), NAMES_FIELD)
+        try:
+            if values.dtype != np.uint8:
+                raise ValueError(f"numbers of type {values.dtype}")
+            given = json.loads(values.tobytes())
+            return {int(label): name for label, name in given.items() if isinstance(name, str)}
+        except (ValueError, AttributeError, RecursionError) as error:
+            raise MeshError(
+                f"expected names of labels in the field data {NAMES_FIELD}, as bytes of JSON, "
+                f'{{"2": "fat"}}; found what is not ({error})'
+            ) from None
 
     def _labels(self, types: IntArray) -> tuple[IntArray | None, list[str]]:
         """Return the labels among the cell data, and what is to be said of them."""
@@ -165,7 +184,11 @@ class _Piece:
         )
 
     def _count(self, attribute: str) -> int:
-        text = self._element.get(attribute, "")
+        return self._count_in(attribute, self._element)
+
+    def _count_in(self, attribute: str, element: ET.Element) -> int:
+        """Return the number in an attribute of an element: that of numbers in the file."""
+        text = element.get(attribute, "")
         count = int(text) if re.fullmatch(r"\s*[0-9]{1,18}\s*", text) else -1
         if not 0 <= count <= self._most:
             raise MeshError(

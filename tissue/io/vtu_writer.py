@@ -1,15 +1,18 @@
 """The state of a body as a VTK unstructured grid (`.vtu`), for ParaView, meshio and `read_mesh`."""
 
 import base64
+import json
 import os
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import IntArray
+from tissue.io.label_arrays import NAMES_FIELD
 from tissue.io.whole_file import whole_file
 from tissue.mesh.mesh_arrays import mesh_arrays
 from tissue.mesh.pieces import piece_of_tetrahedra
@@ -29,6 +32,7 @@ def write_vtu(
     snapshot: Snapshot,
     deformation: Deformation | None = None,
     labels: IntArray | None = None,
+    label_names: Mapping[int, str] = MappingProxyType({}),
 ) -> None:
     """Write `snapshot` to `path`.
 
@@ -44,6 +48,7 @@ def write_vtu(
             [Pa] and `strain`, nine components row by row, and `von_mises` [Pa]. None: none is.
         labels: The label of each tetrahedron, shape (n_tets,), which is the cell data `label` then,
             as `read_mesh` takes it. None: those of the body, if any is not 0.
+        label_names: Names of labels, which are the field data `label_names` then.
 
     Raises:
         MeshError: Positions or tetrahedra have another shape or hold no numbers; labels are no
@@ -53,7 +58,9 @@ def write_vtu(
     """
     if labels is None and snapshot.labels.any():
         labels = snapshot.labels
-    mesh = mesh_arrays(TetrahedralMesh(snapshot.positions, snapshot.tetrahedra, labels))
+    mesh = mesh_arrays(
+        TetrahedralMesh(snapshot.positions, snapshot.tetrahedra, labels, label_names)
+    )
     snapshot = snapshot._replace(positions=mesh.positions, tetrahedra=mesh.tetrahedra)
     n_given = len(mesh.tetrahedra) if deformation is None else len(deformation.stress)
     if n_given != len(mesh.tetrahedra):
@@ -75,9 +82,10 @@ def write_vtu(
 
 
 def write_mesh(path: str | os.PathLike[str], mesh: TetrahedralMesh) -> None:
-    """Write a mesh to `path`, as `read_mesh` takes it; labels are the cell data `label`.
+    """Write a mesh to `path`, as `read_mesh` takes it.
 
-    Numbers keep all their bits. The file appears under its name only when it is complete.
+    Labels are the cell data `label`, and their names the field data `label_names`. Numbers keep all
+    their bits. The file appears under its name only when it is complete.
 
     Args:
         path: The file.
@@ -115,6 +123,10 @@ def _lines(mesh: TetrahedralMesh, points: _Arrays, cells: _Arrays) -> Iterator[s
         'header_type="UInt64">'
     )
     yield "<UnstructuredGrid>"
+    if mesh.labels is not None and mesh.label_names:
+        yield "<FieldData>"
+        yield from _data_array(NAMES_FIELD, _as_bytes(mesh.label_names), "u1", is_field=True)
+        yield "</FieldData>"
     yield f'<Piece NumberOfPoints="{len(mesh.positions)}" NumberOfCells="{n_tets}">'
     yield "<Points>"
     yield from _data_array("Points", mesh.positions, "f8")
@@ -134,10 +146,20 @@ def _lines(mesh: TetrahedralMesh, points: _Arrays, cells: _Arrays) -> Iterator[s
     yield "</VTKFile>"
 
 
-def _data_array(name: str, values: npt.NDArray[np.generic], dtype: str) -> Iterator[str]:
+def _as_bytes(names: Mapping[int, str]) -> npt.NDArray[np.uint8]:
+    """Return names as the bytes of JSON: not each program that reads the format reads strings."""
+    text = json.dumps({str(label): name for label, name in sorted(names.items())})
+    return np.frombuffer(text.encode("ascii"), np.uint8)
+
+
+def _data_array(
+    name: str, values: npt.NDArray[np.generic], dtype: str, *, is_field: bool = False
+) -> Iterator[str]:
     """Yield one array: its size in bytes, then its bytes, in base 64."""
     data = np.ascontiguousarray(values, dtype=dtype)
     components = f' NumberOfComponents="{data.shape[1]}"' if data.ndim == 2 else ""
+    if is_field:
+        components = f' NumberOfTuples="{len(data)}"'
     yield f'<DataArray type="{_TYPE_NAMES[dtype]}" Name="{name}"{components} format="binary">'
     yield base64.b64encode(struct.pack("=Q", data.nbytes) + data.tobytes()).decode("ascii")
     yield "</DataArray>"

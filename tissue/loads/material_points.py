@@ -84,7 +84,8 @@ def region_mask(body: Body, region: str | BoolArray) -> BoolArray:
     """
     n = body.n_nodes
     if isinstance(region, str):
-        mesh = TetrahedralMesh(body.rest[:n], body.tetrahedra[: body.n_tetrahedra])
+        labels = body.materials.label[body.material[: body.n_tetrahedra]]
+        mesh = TetrahedralMesh(body.rest[:n], body.tetrahedra[: body.n_tetrahedra], labels)
         return fixed_nodes(mesh, region)
     if region.shape != (n,):
         raise ValueError(

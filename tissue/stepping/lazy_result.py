@@ -29,6 +29,8 @@ from tissue.types import (
     bounds=lambda result: result.numbers[BOUNDS].reshape(2, 3),
     added_mass=lambda result: AddedMass.of_numbers(result.numbers[ADDED]),
     energies=lambda result: result.energies_of_account(),
+    cutting_of_labels=lambda result: result.of_labels(0),
+    force_of_labels=lambda result: result.of_labels(1),
 )
 class LazyResult(StepResult):
     """The result of a step, with a copy of what the blade reported."""
@@ -40,7 +42,7 @@ class LazyResult(StepResult):
     terms: FloatArray | None
     corners: BoxNumbers
     contacts_of_blade = property(attrgetter("of_blade"))
-    numbers_at_end = property(lambda result: result.numbers[STIFFNESS.start :])
+    numbers_at_end = property(lambda result: result.numbers[STIFFNESS.start : ADDED.stop])
     account = property(attrgetter("terms"))
     box = property(attrgetter("corners"))
     has_views = True
@@ -79,7 +81,8 @@ class LazyResult(StepResult):
         fields = (
             *(Wrench.of_numbers((a, b, c, d, e, f, g, h, i)), None, None, None, None, None),
             *(int(n_tetrahedra), int(n_nodes), n_active, tip_tetrahedron, anchored_length),
-            *(cut_area, finished_area, work_of_blade, work_of_cutting, *of_step, None, None),
+            *(cut_area, finished_area, work_of_blade, work_of_cutting, *of_step),
+            *(None, None, None, None),
         )
         result: Self = tuple.__new__(cls, fields)
         x, y, z, u, v, w = plain[BOUNDS]
@@ -95,6 +98,11 @@ class LazyResult(StepResult):
     def energies_of_account(self) -> Energies | None:
         """Return `energies`."""
         return None if self.terms is None else Energies(*self.terms.tolist()[:-1])
+
+    def of_labels(self, row: int) -> FloatArray:
+        """Return a row of `WrenchReport.of_labels`."""
+        numbers: FloatArray = self.numbers[ADDED.stop :].reshape(2, -1)[row]
+        return numbers
 
     def wrench_at_end(self) -> Wrench:
         """Return `wrench_t1`."""

@@ -195,6 +195,8 @@ RESULT: Message[StepReply] = Message(
                 angular_impulse=(3,),
             ),
             energies=Record(Energies),
+            cutting_of_labels=("labels",),
+            force_of_labels=("labels",),
         ),
         loads=LOADS_ON_FRAMES,
         geom_loads=Record(GeomLoads, forces=("geoms", 3), torques=("geoms", 3)),

@@ -101,6 +101,8 @@ class Wall:
             stage_times=StageTimes(0.0, 0.0, 0.0),
             added_mass=AddedMass(0.0, *np.zeros((4, 3))),
             energies=None,
+            cutting_of_labels=np.zeros(0),
+            force_of_labels=np.zeros(0),
         )
 
     def _depth(self, points: FloatArray) -> FloatArray:

@@ -5,16 +5,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridge import TissueFrame
+from bridge import NamedLabel, TissueFrame
 from scalpel_sim.recording.columns import (
     COLUMNS,
     FrameData,
     WallTimes,
     force_parts,
     frame_row,
+    label_group,
+    label_of_column,
     shared_columns,
 )
-from scalpel_sim.recording.recording import Recording
+from scalpel_sim.recording.recording import Recording, read_forces
 from scalpel_sim.recording.row_writer import RowWriter
 from tissue import AddedMass, BladeSegment, Energies, RigidContacts, Wrench
 
@@ -113,3 +115,25 @@ def test_a_row_that_a_kernel_writes_is_the_same(n, is_audited):
         writer.append(FrameData(*parts, (), WallTimes(*range(5)), 0.0))
     one, other = (recording.rows[:, :-1] for recording in recordings)
     assert one.shape == (1, len(shared_columns()) - 1) and one.tobytes() == other.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        (["", "fat"], ["cutting_0_j", "cutting_1_fat_j", "edge_0_n", "edge_1_fat_n"]),
+        (["a x b", "\u00df"], ["cutting_0_a_x_b_j", "cutting_1_j", "edge_0_a_x_b_n", "edge_1_n"]),
+        (["alone"], []),
+    ],
+)
+def test_columns_of_labels_are_named_by_number_and_name(names, columns, tmp_path):
+    labels = [NamedLabel(i, name) for i, name in enumerate(names)]
+    group = label_group(labels)
+    assert list(group.columns) == columns
+    assert [label_of_column(name) for name in columns] == [0, 1, 0, 1][: len(columns)]
+    path = tmp_path / "forces.csv"
+    path.write_text(",".join([*shared_columns(), *columns]) + "\n")
+    assert read_forces(path).of_label(0) == ((0.0, 0.0) if columns else None)
+
+
+def test_a_mesh_of_very_many_labels_has_no_columns_of_them():
+    assert not label_group([NamedLabel(i, "") for i in range(1000)]).columns

@@ -9,10 +9,12 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.cli.options import BodyOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE, UsageError
-from scalpel_sim.preparation.tissue import check_scene
+from scalpel_sim.preparation.tissue import check_scene, make_tissue
+from scalpel_sim.recording.recording import read_forces
 from scalpel_sim.scene.labels import labelled
+from scalpel_sim.scene.read import read_scene
 from scalpel_sim.scene.schema import LabelTable
-from tissue import MATERIALS, block, write_mesh
+from tissue import MATERIALS, block, read_mesh, write_mesh
 
 MESH = block((4, 4, 4), (0.04, 0.04, 0.04))
 LOW, HIGH = "0,0,0:0.04,0.04,0.02", "0,0,0.02:0.04,0.04,0.04"
@@ -53,11 +55,20 @@ def test_labels_that_cannot_be_are_refused_by_name(rows, message):
         labelled(MESH, rows)
 
 
-def test_the_force_of_layers_is_the_toughness_of_each(tmp_path):
-    """A strip 4 mm thick of skin, fat and muscle (1,136, 200 and 550 J/m2) is cut in two."""
-    command = ["run", "layers", "--quiet", "--out", str(tmp_path)]
-    assert command_line(command) == EXIT_OK
-    force = np.genfromtxt(tmp_path / "forces.csv", delimiter=",", names=True)
+TOUGHNESSES = np.array([1136.0, 200.0, 550.0])
+"""Of skin, fat and muscle [J/m2]."""
+
+
+@pytest.fixture(scope="module")
+def cut_layers(tmp_path_factory):
+    """A strip 4 mm thick of skin, fat and muscle is cut in two."""
+    folder = tmp_path_factory.mktemp("layers")
+    assert command_line(["run", "layers", "--quiet", "--out", str(folder)]) == EXIT_OK
+    return folder
+
+
+def test_the_force_of_layers_is_the_toughness_of_each(cut_layers):
+    force = np.genfromtxt(cut_layers / "forces.csv", delimiter=",", names=True)
     area, felt = force["cut_area_m2"], np.abs(force["force_y_n"])
     # Fat is thin: the edge is held again soon before it comes to muscle.
     found = [
@@ -65,12 +76,78 @@ def test_the_force_of_layers_is_the_toughness_of_each(tmp_path):
         felt[np.argmax(area > 56e-6)],
         np.median(felt[(area > 80e-6) & (area < 120e-6)]),
     ]
-    np.testing.assert_allclose(found, 0.004 * np.array([1136.0, 200.0, 550.0]), rtol=0.05)
+    np.testing.assert_allclose(found, 0.004 * TOUGHNESSES, rtol=0.05)
     parts = {
-        row["name"]: row for row in json.loads((tmp_path / "summary.json").read_text())["labels"]
+        row["name"]: row for row in json.loads((cut_layers / "summary.json").read_text())["labels"]
     }
     found = [parts[name]["cut_area_m2"] for name in ("skin", "fat", None)]
     np.testing.assert_allclose(found, [16e-6, 48e-6, 64e-6], rtol=0.01)
+
+
+def test_columns_of_labels_have_the_work_and_the_force_of_each(cut_layers):
+    forces = read_forces(cut_layers / "forces.csv")
+    names = ("1_skin", "2_fat", "0")
+    work = np.array([forces.column(f"cutting_{name}_j") for name in names])
+    # Skin springs apart before the edge has gone through all of it.
+    np.testing.assert_allclose(work[1:, -1], TOUGHNESSES[1:] * [48e-6, 64e-6], rtol=0.05)
+    np.testing.assert_allclose(work.sum(axis=0), forces.column("cutting_j"), rtol=1e-9, atol=1e-15)
+    area = forces.column("cut_area_m2")
+    for name, toughness, low, high in (
+        ("1_skin", TOUGHNESSES[0], 2e-6, 12e-6),
+        ("0", TOUGHNESSES[2], 80e-6, 120e-6),
+    ):
+        felt = forces.column(f"edge_{name}_n")[(area > low) & (area < high)]
+        assert np.median(felt) == pytest.approx(0.004 * toughness, rel=0.05)
+    (skin,) = [
+        row
+        for row in json.loads((cut_layers / "summary.json").read_text())["labels"]
+        if row["name"] == "skin"
+    ]
+    assert skin["work_of_cutting_j"] == work[0, -1]
+    assert skin["edge_force_peak_n"] == forces.column("edge_1_skin_n").max()
+
+
+def test_the_final_mesh_has_the_names_of_its_labels(cut_layers):
+    assert read_mesh(cut_layers / "final.vtu").label_names == {1: "skin", 2: "fat"}
+
+
+def test_a_region_of_a_scene_may_be_a_label(tmp_path):
+    path = tmp_path / "held.toml"
+    path.write_text(
+        """
+        [body]
+        shape = "block"
+        cells = [6, 4, 4]
+        size = [0.06, 0.04, 0.04]
+        fixed = "label:bone"
+        [[label]]
+        name = "bone"
+        region = "0,0,0:0.01,0.04,0.04"
+        [[label]]
+        name = "stone"
+        region = "0.02,0.01,0.01:0.04,0.03,0.03"
+        [[core]]
+        where = "label:stone"
+        [[attachment]]
+        where = "label:stone"
+        stiffness = 10.0
+        """
+    )
+    scene = read_scene(path)
+    tissue = make_tissue(scene)
+    body = tissue.snapshot()
+    assert np.array_equal(body.fixed, body.rest_positions[:, 0] < 0.011)
+    (core,) = tissue.cores
+    np.testing.assert_allclose(core.centre[:2], [0.03, 0.02], atol=1e-3)
+    assert len(tissue.attachments[0].points.rest) == 27
+
+
+def test_a_part_cannot_be_the_region_of_a_label(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(
+        '[body]\nshape = "organ"\n[[label]]\nname = "a"\nregion = "label:b"\n'
+    )
+    assert command_line(["run", str(tmp_path / "scene.toml")]) == EXIT_WRONG_USE
+    assert "it is a box" in capsys.readouterr().err
 
 
 def test_a_part_that_was_to_be_spared_and_is_cut_is_said(tmp_path, capsys):
