@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL import Image
 
 GALLERY = Path(__file__).parents[1] / "gallery"
-NAMES = ("organ", "retract", "gallbladder", "10", "11", "12")
+NAMES = ("organ", "retract", "gallbladder", "layers", "tumour", "10", "11", "12")
 """Those that `scalpel-sim figure` draws."""
 WIDTH = 960
 """Of a picture [pixels]: two panels of a page."""

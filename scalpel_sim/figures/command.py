@@ -1,4 +1,4 @@
-"""The command `figure`: draws the paper's figures, and those of the organ and of two hands."""
+"""The command `figure`: draws the paper's figures, and those of the organ and of scenes."""
 
 import json
 from pathlib import Path
@@ -10,8 +10,12 @@ from scalpel_sim.runs.console import log_to_stderr, say
 from scalpel_sim.runs.options import OUTPUT, PrintOptions
 
 FigureNumber = Annotated[
-    Literal[10, 11, 12, "organ", "retract", "excise", "taut_incision", "gallbladder"],
-    Parameter(help="10, 11, 12, organ, retract, excise, taut_incision or gallbladder."),
+    Literal[
+        10, 11, 12, "organ", "retract", "excise", "taut_incision", "gallbladder", "layers", "tumour"
+    ],
+    Parameter(
+        help="10, 11, 12, organ, retract, excise, taut_incision, gallbladder, layers or tumour."
+    ),
 ]
 
 
@@ -28,7 +32,8 @@ def figure(
     Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
     the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells. organ: two
     frames of a cut through the organ, which is the picture of the README. retract, excise,
-    taut_incision, gallbladder: two moments of the scene of that name, with both instruments.
+    taut_incision, gallbladder, layers, tumour: two moments of the scene of that name, with all
+    instruments.
 
     For example:
 
@@ -37,7 +42,7 @@ def figure(
     ```
 
     Args:
-        number: 10, 11, 12, organ, retract, excise, taut_incision or gallbladder.
+        number: 10, 11, 12, organ, retract, excise, taut_incision, gallbladder, layers or tumour.
         output: The file [default: figure10.png (11, ...) in this folder].
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """

@@ -75,14 +75,16 @@ _ORGAN_MOMENTS = (0.5, 0.72)
 """Shares of the stroke: half way, and shortly before the organ falls in two."""
 _ORGAN_COLOURS = 256
 """Colours of the file, which is then less than half as large."""
-TWO_HANDS = {
+MOMENTS = {
     "retract": (3.6, 4.2),
     "excise": (1.75, 3.3),
     "taut_incision": (2.4, 3.2),
     "gallbladder": (2.0, 3.2),
+    "layers": (0.64, 1.6),
+    "tumour": (1.4, 2.7),
 }
-"""Scenes that have such a picture, and its moments [s]: as the blade cuts, and when the left hand
-has what came off; or as the blade is in, and when it is out."""
+"""Scenes that have a picture of two moments, and these [s]: as the blade cuts, and when a left hand
+has what came off, or when the blade is out."""
 
 
 class Drawn(NamedTuple):
@@ -100,7 +102,7 @@ def draw_figure(number: int | str, path: Path, scheme: str = "stellar") -> Drawn
     """Do the cuts of a figure, write its PNG, and return what it shows.
 
     Args:
-        number: 10, 11 or 12; organ; or one of `TWO_HANDS`, which are cut as their scenes say.
+        number: 10, 11 or 12; organ; or one of `MOMENTS`, which are cut as their scenes say.
         path: File to write.
         scheme: How the mesh is cut: `stellar` or `paper`.
 
@@ -116,7 +118,7 @@ def draw_figure(number: int | str, path: Path, scheme: str = "stellar") -> Drawn
         canvas = FigureCanvasAgg(figure)
         write = partial(canvas.print_figure, dpi=_DOTS_PER_INCH, format="png")
     else:
-        panels, drawn = _organ(scheme) if number == "organ" else _two_hands(number)
+        panels, drawn = _organ(scheme) if number == "organ" else _scene(number)
         image = _side_by_side(panels)
         image = image.quantize(_ORGAN_COLOURS) if number == "organ" else image
         write = partial(image.save, format="PNG", optimize=True)
@@ -159,14 +161,14 @@ def _organ(scheme: str) -> tuple[list[FloatArray], Drawn]:
     return _pictures(seen), Drawn(caption, labels, _sizes(seen))
 
 
-def _two_hands(name: str) -> tuple[list[FloatArray], Drawn]:
+def _scene(name: str) -> tuple[list[FloatArray], Drawn]:
     scene = SCENES[name]
     simulation = prepare(scene)
     seen = []
-    for seconds in TWO_HANDS[name]:
+    for seconds in MOMENTS[name]:
         simulation.run(seconds)
         seen.append(moment_of(simulation))
-    labels = [f"after {seconds:g} s" for seconds in TWO_HANDS[name]]
+    labels = [f"after {seconds:g} s" for seconds in MOMENTS[name]]
     look = look_of_scene(scene)
     pictures = _pictures(seen, scene.views, look if look.labels else ORGAN_LOOK)
     return pictures, Drawn(scene.about, labels, _sizes(seen))

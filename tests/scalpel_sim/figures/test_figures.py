@@ -117,3 +117,14 @@ def test_the_picture_shows_what_the_left_hand_lifts_before_and_after_it_is_cut_o
         red, green, blue = np.moveaxis(half, 2, 0)
         grey = (np.abs(red - blue) < 0.08) & (np.abs(red - green) < 0.08) & (red < 0.9)
         assert grey.sum() > 100 and (blue > 1.5 * red).sum() > 20
+
+
+def test_the_picture_of_layers_shows_each_in_its_colour(small, monkeypatch, capsys):
+    monkeypatch.setitem(figures.MOMENTS, "layers", (0.01, 0.02))
+    assert command_line(["figure", "layers", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    red, green, blue = np.moveaxis(matplotlib.image.imread(printed["file"])[:, :, :3], 2, 0)
+    fat = (red > 0.5) & (green > 0.7 * red) & (blue < 0.6 * red)
+    muscle = (red > 0.3) & (green < 0.5 * red) & (blue < 0.5 * red)
+    skin = (red > 0.5) & (green < 0.85 * red) & (green > 0.6 * red) & (blue > 0.6 * green)
+    assert min(part.sum() for part in (fat, muscle, skin)) > 300
