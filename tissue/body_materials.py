@@ -13,12 +13,9 @@ from tissue.mesh.material_table import SCALED, MaterialArrays
 from tissue.mesh.parts import MOST_NAMED, described_label, labels_of_part
 from tissue.types import TetrahedralMesh
 
-ALIKE = ("viscous_damping", "prony")
-"""Quantities that all materials of a body share: of the motion of the whole."""
-
-SPRINGS_ALIKE = ("retardation_time",)
-"""Quantities that they share, besides, where springs carry the shear: dampers have the stiffness of
-springs."""
+ALIKE_WITH_SPRINGS = ("retardation_time",)
+"""Quantities that all materials of a body share where springs carry the shear: dampers have the
+stiffness of springs."""
 
 LabelKey = int | str | None
 """A label by its number, or by its name in the file of the mesh; a body, by its name, with all its
@@ -148,13 +145,12 @@ def _expect_alike(name: str, one: Material, other: Material) -> None:
             f"{where} has law {one.law.name} and the rest of the body {other.law.name}: one body "
             "has one law. Moduli, and how much a law stiffens, may differ from label to label"
         )
-    names = ALIKE + SPRINGS_ALIKE * one.law.has_springs
-    for quantity in names:
+    for quantity in ALIKE_WITH_SPRINGS * one.law.has_springs:
         mine, theirs = getattr(one, quantity), getattr(other, quantity)
         if mine != theirs:
             raise ValueError(
-                f"{where} has {quantity} {mine} and the rest of the body {theirs}: it is "
-                "the same in all of a body"
+                f"{where} has {quantity} {mine} and the rest of the body {theirs}: it is the same "
+                "in all of a body of law springs, whose dampers have the stiffness of springs"
             )
 
 

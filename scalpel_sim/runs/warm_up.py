@@ -89,7 +89,7 @@ class KernelSet(NamedTuple):
         has_sides = scene.blade is not None
         law, solver = scene.material.law.name, scene.solver
         how = (solver.audit, has_sides, solver.precision)
-        relaxes = bool(scene.material.prony)
+        relaxes = any(material.prony for material in scene.all_materials)
         is_held = bool(scene.attachments) or any(
             grasper.holds == "attachment" for grasper in scene.graspers
         )

@@ -122,7 +122,9 @@ def built(
     """Return the solid of a body whose masses are set."""
     n, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     room = (len(body.rest), len(body.tetrahedra))
-    solid = no_solid(law, *room, room_for_stars(*room), prony=prony, is_single=is_single)
+    terms = np.array(prony, dtype=np.float64).reshape(-1, 2, 1)
+    series = terms[:, 0], terms[:, 1]
+    solid = no_solid(law, *room, room_for_stars(*room), series=series, is_single=is_single)
     visits = no_visits(*room)
     build_tetrahedra(solid, body, solid.every, n_tetrahedra)
     around = np.zeros(LARGEST_STAR, dtype=np.int64)

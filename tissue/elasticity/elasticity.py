@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 
-from tissue.core.array_types import IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import SameTypes
 from tissue.elasticity.collapse import no_collapse, renew_collapsing
 from tissue.elasticity.finite_elements import (
     averages_shear,
     build_tetrahedra,
-    graded_solid,
     grown_solid,
     is_graded,
     no_solid,
@@ -21,7 +20,7 @@ from tissue.elasticity.frequency.changes import (
     update_frequencies,
 )
 from tissue.elasticity.frequency.strained import StepLimit, strained_frequency
-from tissue.elasticity.graded import write_moduli
+from tissue.elasticity.graded import graded_solid, write_moduli
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
@@ -38,7 +37,7 @@ from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.material_table import OF_LAW, OF_STIFFENING
+from tissue.mesh.material_table import OF_LAW, OF_STIFFENING, MaterialArrays
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 ROOM_FOR_SPRINGS = 1 << 16
@@ -75,7 +74,7 @@ class Elasticity:
         averages_shear: bool = False,
         resists_collapse: bool = True,
     ) -> None:
-        self._relaxes = bool(material.prony)
+        self._relaxes = len(body.materials.series[0]) > 0
         self._update_frequencies = SameTypes(update_frequencies)
         self._renew_collapsing = SameTypes(renew_collapsing)
         self.is_single = is_single
@@ -94,13 +93,14 @@ class Elasticity:
         law_or_none = law or volume_term(0.0)
         slots = room_for_stars(*room)
         retardation_time = float(body.materials.retardation_time.max())
+        is_graded_body = law is not None and body.materials.is_even == 0
         solid = no_solid(
             law_or_none,
             *room,
             slots,
-            prony=material.prony,
+            series=_series_of(body.materials, is_graded=is_graded_body),
             is_single=is_single,
-            is_graded=law is not None and body.materials.is_even == 0,
+            is_graded=is_graded_body,
             retardation_time=retardation_time,
         )
         is_viscous = retardation_time > 0.0 and not self._has_springs
@@ -139,9 +139,13 @@ class Elasticity:
             if materials.is_even == 0:
                 solid = graded_solid(solid)
             law = {name: float(getattr(materials, name)[0]) for name in (*OF_LAW, *OF_STIFFENING)}
+            shares, times = _series_of(materials, is_graded=is_graded(solid))
             solid = solid.replaced(
                 law=solid.law if is_graded(solid) else solid.law.replaced(**law),
                 retardation_time=float(materials.retardation_time.max()),
+                relaxing_shares=shares.ravel(),
+                relaxation_times=times.ravel(),
+                relaxation_weights=np.zeros(shares.size),
             )
         self.arrays = arrays = arrays.replaced(solid=solid, scaling=no_mass_scaling())
         arrays.highest = arrays.highest_of_tetrahedra = arrays.highest_of_dampers = 0.0
@@ -263,3 +267,9 @@ class Elasticity:
                 solid, len(solid.first), len(body.tetrahedra), 2 * len(solid.corner)
             )
             self.arrays = self.arrays.replaced(solid=larger)
+
+
+def _series_of(materials: MaterialArrays, *, is_graded: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the Prony series of all materials, or that of the first where all have the same."""
+    shares, times = materials.series
+    return (shares, times) if is_graded else (shares[:, :1], times[:, :1])

@@ -17,9 +17,9 @@ falls, by what the dashpots dissipate. At large strain the shares of what is sto
 dissipated are estimates; their sum is exact.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes, store_point
 from tissue.core.simd_blocks import (
@@ -58,6 +58,7 @@ from tissue.elasticity.internal_forces import Elastic, Surroundings, resist, vis
 from tissue.elasticity.neo_hookean import deform_solid, dilated_around, own_dilatation
 from tissue.elasticity.relaxed_stress import (
     PRESSURE,
+    of_term,
     relaxed_pressure,
     relaxes,
     rows_of_stress,
@@ -72,6 +73,9 @@ from tissue.laws.kernels import (
     stretch_invariant,
 )
 from tissue.mesh.body import Body
+
+_LEAST_SHARE: Final = 1e-20
+"""A g far below any, in place of 0 of a term that a material does not have."""
 
 
 @kernel
@@ -137,7 +141,7 @@ def dissipated_power(
     for node in range(body.n_nodes):
         v = vec3(velocities, node)
         if not body.fixed[node]:
-            power += surroundings.drag * body.masses[node] * dot(v, v)
+            power += surroundings.drag * body.drag[node] * body.masses[node] * dot(v, v)
         if time > 0.0:
             force = viscous_force(elastic, node, positions, velocities, time)
             store_point(scratch, node, force)
@@ -183,9 +187,10 @@ def relaxed_energy(solid: Solid, body: Body) -> float:
 @inlined
 def _relaxed_energies(solid: Solid, block: int) -> Lanes:
     """Return what relaxation adds to the energies of the tetrahedra of a block [J]."""
-    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    width, n_terms = width_of(solid.shape), solid.n_terms
     v, gradient = shape_of(solid, block, VOLUME), known_gradient(solid, block)
-    rows = _Relaxed(solid.relaxed, solid.relaxed_terms, block, own_share_of(solid, block, v))
+    numbers, own = (solid.relaxed, solid.relaxed_terms), own_share_of(solid, block, v)
+    rows = _Relaxed(*numbers, solid.series, block, own)
     total = _of_relaxed(solid, rows, law_of_block(solid, block, v), gradient)
     total = total - relaxed_pressure(solid, block) * own_dilatation(solid, block, v)
     for term in range(n_terms):
@@ -201,7 +206,8 @@ def _relaxed_energies_of_nodes(solid: Solid, block: int) -> Lanes:
     first = width_of(solid.shape) * block
     gradient, _, _ = averages_of(solid, first)
     share = splat(solid.law.shear_of_nodes, gradient[0].x)
-    rows = _Relaxed(solid.node_relaxed, solid.node_relaxed_terms, block, share)
+    numbers = solid.node_relaxed, solid.node_relaxed_terms
+    rows = _Relaxed(*numbers, solid.node_series, block, share)
     w = _of_relaxed(solid, rows, law_of_nodes(solid, first, share), gradient)
     return gathered_like(w, solid.node_volume, solid.every, first) * w
 
@@ -213,6 +219,8 @@ class _Relaxed(NamedTuple):
     """`Solid.relaxed`, or `Solid.node_relaxed`."""
     terms: FloatArray
     """The same of each term."""
+    series: SlotArray
+    """`Solid.series`, or `Solid.node_series`."""
     block: int
     """The block."""
     share: Lanes
@@ -229,7 +237,7 @@ def _of_relaxed(solid: Solid, relaxed: _Relaxed, of: LawOfBlock, gradient: Matri
         of: The law.
         gradient: Rows of H.
     """
-    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    width, n_terms = width_of(solid.shape), solid.n_terms
     x, y, z = gradient
     rx, ry, rz = rows_of_stress(relaxed.sums, width * N_RELAXED * relaxed.block)
     # R : E = R : H + sum over the rows h of H of h . R h / 2
@@ -240,7 +248,8 @@ def _of_relaxed(solid: Solid, relaxed: _Relaxed, of: LawOfBlock, gradient: Matri
     for term in range(n_terms):
         at = width * N_RELAXED * (n_terms * relaxed.block + term)
         rows = rows_of_stress(relaxed.terms, at)
-        g = relaxed.share * splat(solid.relaxing_shares[term], strained)
+        numbers, series = solid.relaxing_shares, relaxed.series
+        g = relaxed.share * of_term(solid, numbers, series, relaxed.block, term, strained)
         total = total + _complementary(of, g, rows)
     return total
 
@@ -280,9 +289,12 @@ def _bulk_compliance(solid: Solid, block: int, term: int, like: Lanes) -> Lanes:
         term: The term.
         like: A vector of the type of the numbers.
     """
-    law, g = solid.law, solid.relaxing_shares[term]
+    law = solid.law
     if is_graded(solid):
-        return splat(1.0 / g, like) * modulus_of(solid, block, BULK)
+        g = of_term(solid, solid.relaxing_shares, solid.series, block, term, like)
+        # A term that the material does not have has no r.
+        return modulus_of(solid, block, BULK) / larger(g, splat(_LEAST_SHARE, like))
+    g = solid.relaxing_shares[term]
     modulus = law.lam_of_tetrahedra + law.lam_of_nodes
     bulk = modulus - law.excess + law.shear_modulus * 2.0 / 3.0
     return splat(0.5 * bulk / (g * modulus**2), like)

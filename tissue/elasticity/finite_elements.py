@@ -12,8 +12,6 @@ in single: block b of width w holds tetrahedra w b to w b + w - 1, and the value
 stand in a row. The state, positions and velocities, is always double.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
@@ -52,6 +50,9 @@ grad N_2 and grad N_3; grad N_0 is minus their sum."""
 LARGEST_RING = 3 * LARGEST_STAR + 1
 """Nodes of the tetrahedra around one node at most, itself among them."""
 
+_NO_TERMS = np.zeros((0, 1))
+"""The terms of tissue whose stress does not relax."""
+
 
 class Solid(Arrays, two_precisions=True):
     """Every tetrahedron and the star of every node. Rows beyond the body's counts are spare."""
@@ -89,13 +90,20 @@ class Solid(Arrays, two_precisions=True):
     """lam of averaged rates [Pa]."""
     retardation_time: float
     """Retardation time of the body, to which `moduli` refer [s]."""
+    n_terms: IntCell
+    """Number of terms of the Prony series; 0 where no stress relaxes."""
     relaxing_shares: FloatArray
-    """g of each term of the Prony series, shape (terms,); empty where no stress relaxes."""
+    """g of each term, for all materials of the first term, then of the second, and so on; of one
+    alone where the whole body has the same moduli. Shape (n_terms * materials,)."""
     relaxation_times: FloatArray
-    """tau of each term [s], shape (terms,)."""
-    relaxation_weights: FloatArray = sized("terms")
-    """Scratch of `viscoelasticity`: how far each term goes to its limit in a step, shape
-    (terms,)."""
+    """tau of each [s], in the same order."""
+    relaxation_weights: FloatArray
+    """Scratch of `viscoelasticity`: how far each goes to its limit in a step."""
+    series: SlotArray = sized("graded_terms", is_for_vectors=True)
+    """Place of each term of each tetrahedron in these three, in blocks of as many rows as there are
+    terms; empty where `moduli` is."""
+    node_series: SlotArray = sized("graded_node_terms", is_for_vectors=True)
+    """The same of the averaged shear of each node."""
     relaxed: FloatArray = sized((N_RELAXED, "relaxing"), is_for_vectors=True)
     """Stress that has relaxed in each tetrahedron [Pa], the sum of all terms, in blocks of seven
     rows; empty where no stress relaxes."""
@@ -223,7 +231,7 @@ def no_solid(
     n_tetrahedra: int,
     pool: int,
     *,
-    prony: Sequence[tuple[float, float]] = (),
+    series: tuple[FloatArray, FloatArray] = (_NO_TERMS, _NO_TERMS),
     is_single: bool = False,
     is_graded: bool = False,
     retardation_time: float = 0.0,
@@ -235,20 +243,23 @@ def no_solid(
         n_nodes: Number of nodes.
         n_tetrahedra: Number of tetrahedra.
         pool: Number of slots.
-        prony: g and tau [s] of each term of the Prony series; none where no stress relaxes.
+        series: g and tau [s] of each term of the Prony series of each material, shape (n_terms,
+            n_materials); no term where no stress relaxes.
         is_single: Whether forces are computed in single precision.
         is_graded: Whether tetrahedra have moduli of their own.
         retardation_time: Of the body [s].
     """
     real = np.float32 if is_single else np.float64
-    terms = np.array(prony, dtype=np.float64).reshape(-1, 2)
+    shares, times = series
     return Solid.new(
-        _sizes(law, n_nodes, n_tetrahedra, pool, len(terms), is_single, is_graded),
+        _sizes(law, n_nodes, n_tetrahedra, pool, len(shares), is_single, is_graded),
         real=real,
         law=law,
         retardation_time=float(retardation_time),
-        relaxing_shares=terms[:, 0].copy(),
-        relaxation_times=terms[:, 1].copy(),
+        n_terms=len(shares),
+        relaxing_shares=shares.ravel(),
+        relaxation_times=times.ravel(),
+        relaxation_weights=np.zeros(shares.size),
         every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH),
         fastest=-1,
     )
@@ -278,7 +289,8 @@ def _sizes(
         "averaging_relaxing_terms": averaging * n_terms,
         "averaged_behind_a_block": width * (1 + blocks) if averages else 0,
         "pool": pool,
-        "terms": n_terms,
+        "graded_terms": width * blocks * n_terms if is_graded else 0,
+        "graded_node_terms": averaging * n_terms if is_graded else 0,
         "blocks": blocks,
         "in_blocks": width * blocks,
         "in_blocks_of_singles": width * blocks if is_single else 0,
@@ -291,18 +303,12 @@ def _sizes(
 def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     is_single = solid.shape.dtype == np.float32
-    n_terms = len(solid.relaxation_times)
+    n_terms = solid.n_terms
     sizes = _sizes(
         solid.law, n_nodes, n_tetrahedra, pool, n_terms, is_single, bool(is_graded(solid))
     )
     larger = solid.grown(sizes)
     return larger.replaced(every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH))
-
-
-def graded_solid(solid: Solid) -> Solid:
-    """Return the rows with room for moduli of each tetrahedron, with the same numbers."""
-    in_blocks, n_nodes = len(solid.shape) // N_SHAPE, len(solid.first)
-    return solid.grown({"graded": in_blocks, "graded_nodes": n_nodes + 2 * WIDTH})
 
 
 @kernel

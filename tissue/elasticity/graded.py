@@ -16,15 +16,16 @@ Viscosity, which has no law of its own, is divided in the same way.
 
 from typing import Final, NamedTuple
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import Lanes
+from tissue.core.simd import WIDTH, Lanes
 from tissue.core.simd_blocks import gathered_like, load_block, splat, width_of
 from tissue.elasticity.finite_elements import (
     BULK,
     EXPONENT,
     MU,
     N_MODULI,
+    N_SHAPE,
     OWN_LAM,
     OWN_SHEAR,
     VISCOUS_LAM,
@@ -33,6 +34,7 @@ from tissue.elasticity.finite_elements import (
     YEOH_SECOND,
     YEOH_THIRD,
     Solid,
+    averages_shear,
     is_graded,
     node_place,
     shape_place,
@@ -46,6 +48,15 @@ LEAST_LAM: Final = -2.0 / 3.0
 
 NO_MODULUS: Final = 1.0
 """A modulus far below any [Pa], in place of 0 where springs alone are elastic."""
+
+
+def graded_solid(solid: Solid) -> Solid:
+    """Return the rows with room for moduli of each tetrahedron, with the same numbers."""
+    in_blocks, n_nodes = len(solid.shape) // N_SHAPE, len(solid.first)
+    sizes = {"graded": in_blocks, "graded_nodes": n_nodes + 2 * WIDTH}
+    sizes["graded_terms"] = in_blocks * solid.n_terms
+    sizes["graded_node_terms"] = len(solid.stiffness_taken) * solid.n_terms
+    return solid.grown(sizes)
 
 
 @inlined
@@ -215,6 +226,8 @@ def _write_node(solid: Solid, body: Body, node: int) -> None:
         is_mixed = is_mixed or materials.label[row] != materials.label[first]
         is_even = is_even and row == first
     solid.node_is_mixed[node] = 1.0 if is_mixed else 0.0
+    if averages_shear(solid):
+        _write_series(solid, body, solid.node_series, node, first)
     _clear_node(solid, node)
     if is_mixed:
         solid.node_exponent[node] = materials.exponent[first]  # of no modulus
@@ -306,3 +319,23 @@ def _write_tetrahedron(solid: Solid, body: Body, t: int) -> None:
     solid.moduli[_place(solid, t, BULK)] = 0.5 * bulk / modulus**2
     solid.moduli[_place(solid, t, VISCOUS_MU)] = viscous.own_mu + mixed * viscous.mean_mu
     solid.moduli[_place(solid, t, VISCOUS_LAM)] = viscous.own_lam + mixed * viscous.mean_lam
+    _write_series(solid, body, solid.series, t, row)
+
+
+@kernel
+def _write_series(solid: Solid, body: Body, series: SlotArray, i: int, row: int) -> None:
+    """Write where the Prony series of a material is, of a tetrahedron or a node.
+
+    Materials of one label, of which a node may have several, have one series.
+
+    Args:
+        solid: For the number of terms.
+        body: The materials.
+        series: `Solid.series`, or `Solid.node_series`; written.
+        i: The tetrahedron, or the node.
+        row: The material.
+    """
+    width, n_terms = width_of(solid.shape), solid.n_terms
+    for term in range(n_terms):
+        at = width * (n_terms * (i // width) + term) + i % width
+        series[at] = len(body.materials.label) * term + row

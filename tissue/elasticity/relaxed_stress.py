@@ -15,10 +15,10 @@ an R of their own, which follows from their F, and takes F R from their stress.
 Forces need the sum over all terms, which is kept with the terms.
 """
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
-from tissue.core.simd_blocks import load_block, splat, width_of
+from tissue.core.simd_blocks import gathered_like, load_block, splat, width_of
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, is_graded, shape_place
 from tissue.elasticity.graded import own_share_of_one
@@ -31,7 +31,7 @@ PRESSURE = 6
 @inlined
 def relaxes(solid: Solid) -> bool:
     """Return whether the stress of the tetrahedra relaxes."""
-    return len(solid.relaxing_shares) > 0
+    return solid.n_terms > 0
 
 
 @kernel
@@ -45,10 +45,30 @@ def relaxed_place(solid: Solid, t: int, which: int) -> int:
 @kernel
 def relaxed_term_place(solid: Solid, t: int, term: int, which: int) -> int:
     """Return where number `which` of a term in tetrahedron, or node, `t` is."""
-    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    width, n_terms = width_of(solid.shape), solid.n_terms
     row = N_RELAXED * (n_terms * (t // width) + term) + which
     place: int = width * row + t % width
     return place
+
+
+@inlined
+def of_term(
+    solid: Solid, numbers: FloatArray, series: SlotArray, block: int, term: int, like: Lanes
+) -> Lanes:
+    """Return a number of a term of a block, of tetrahedra or nodes.
+
+    Args:
+        solid: The Prony series.
+        numbers: One of its three arrays, `relaxing_shares` and so on.
+        series: `Solid.series`, or `Solid.node_series`.
+        block: The block.
+        term: The term.
+        like: A vector of the type of numbers.
+    """
+    if not is_graded(solid):
+        return splat(numbers[term], like)
+    first = width_of(solid.shape) * (solid.n_terms * block + term)
+    return gathered_like(like, numbers, series, first)
 
 
 @inlined
@@ -124,7 +144,7 @@ def inherit_relaxed(solid: Solid, children: IntArray, n: int) -> None:
         for which in range(N_RELAXED):
             value = solid.relaxed[relaxed_place(solid, parent, which)]
             solid.relaxed[relaxed_place(solid, child, which)] = value
-            for term in range(len(solid.relaxing_shares)):
+            for term in range(solid.n_terms):
                 value = solid.relaxed_terms[relaxed_term_place(solid, parent, term, which)]
                 solid.relaxed_terms[relaxed_term_place(solid, child, term, which)] = value
 
@@ -141,7 +161,7 @@ def inherit_at_nodes(solid: Solid, nodes: IntArray, n: int) -> None:
         nodes: The nodes.
         n: How many of them.
     """
-    n_terms, share = len(solid.relaxing_shares), solid.law.shear_of_nodes
+    n_terms, share = solid.n_terms, solid.law.shear_of_nodes
     share /= 1.0 - share
     for i in range(n):
         node = nodes[i]

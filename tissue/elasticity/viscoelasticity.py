@@ -25,7 +25,7 @@ second order.
 
 import math
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import load_block, splat, store_block, width_of
@@ -36,6 +36,7 @@ from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, averages
 from tissue.elasticity.graded import law_of_block, law_of_nodes, own_share_of, shear_of_nodes
 from tissue.elasticity.gradients import known_gradient, shape_of
 from tissue.elasticity.neo_hookean import own_dilatation, pressure_of, with_own_pressure
+from tissue.elasticity.relaxed_stress import of_term
 from tissue.elasticity.stress import MatrixRows, cofactors_of
 from tissue.laws.kernels import (
     LawOfBlock,
@@ -53,8 +54,8 @@ a tetrahedron that is turned inside out has none."""
 @kernel
 def prepare_relaxation(solid: Solid, seconds: float) -> None:
     """Note for each term how far it goes to its limit in that time [s], which may be infinite."""
-    for term in range(len(solid.relaxing_shares)):
-        solid.relaxation_weights[term] = -math.expm1(-seconds / solid.relaxation_times[term])
+    for i in range(len(solid.relaxing_shares)):
+        solid.relaxation_weights[i] = -math.expm1(-seconds / solid.relaxation_times[i])
 
 
 @kernel
@@ -65,7 +66,7 @@ def relax_blocks(solid: Solid, begin: int, end: int) -> None:
     """
     for block in range(begin, end):
         stress = _elastic_stress(solid, block)
-        _relax(solid, solid.relaxed, solid.relaxed_terms, block, stress)
+        _relax(solid, solid.relaxed, solid.relaxed_terms, solid.series, block, stress)
 
 
 @kernel
@@ -77,7 +78,8 @@ def relax_nodes(solid: Solid, begin: int, end: int) -> None:
     width = width_of(solid.shape)
     for block in range(begin // width, (end + width - 1) // width):
         stress = _elastic_stress_of_nodes(solid, block)
-        _relax(solid, solid.node_relaxed, solid.node_relaxed_terms, block, stress)
+        terms, series = solid.node_relaxed_terms, solid.node_series
+        _relax(solid, solid.node_relaxed, terms, series, block, stress)
 
 
 @inlined
@@ -85,6 +87,7 @@ def _relax(
     solid: Solid,
     relaxed: FloatArray,
     terms: FloatArray,
+    series: SlotArray,
     block: int,
     stress: tuple[Vec3, Vec3, Lanes],
 ) -> None:
@@ -94,15 +97,17 @@ def _relax(
         solid: The Prony series.
         relaxed: R and r of tetrahedra, or of nodes; written.
         terms: Those of each term; written.
+        series: `Solid.series`, or `Solid.node_series`.
         block: A block of these.
         stress: xx, yy, zz and yz, xz, xy of S, and p [Pa].
     """
-    width, n_terms = width_of(solid.shape), len(solid.relaxing_shares)
+    width, n_terms = width_of(solid.shape), solid.n_terms
     along, across, p = stress
     zero = splat(0.0, p)
     rxx, ryy, rzz, ryz, rxz, rxy, r = zero, zero, zero, zero, zero, zero, zero
     for term in range(n_terms):
-        share, weight = solid.relaxing_shares[term], solid.relaxation_weights[term]
+        share = of_term(solid, solid.relaxing_shares, series, block, term, p)
+        weight = of_term(solid, solid.relaxation_weights, series, block, term, p)
         at = width * N_RELAXED * (n_terms * block + term)
         rxx = rxx + _relaxed(terms, at, share, weight, along.x)
         ryy = ryy + _relaxed(terms, at + width, share, weight, along.y)
@@ -122,7 +127,7 @@ def _relax(
 
 
 @inlined
-def _relaxed(terms: FloatArray, at: int, share: float, weight: float, stress: Lanes) -> Lanes:
+def _relaxed(terms: FloatArray, at: int, share: Lanes, weight: Lanes, stress: Lanes) -> Lanes:
     """Move a number of a term of a block towards its limit, and return it.
 
     Args:
@@ -133,7 +138,7 @@ def _relaxed(terms: FloatArray, at: int, share: float, weight: float, stress: La
         stress: The same number of the elastic stress.
     """
     old = load_block(terms, at)
-    new = old + splat(weight, old) * (splat(share, old) * stress - old)
+    new = old + weight * (share * stress - old)
     store_block(terms, at, new)
     return new
 

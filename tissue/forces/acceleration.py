@@ -52,6 +52,7 @@ def acceleration_of(
         force = internal_force(context.elastic, node, positions, velocities, time)
     force = force + point(context.stages.external, node) + point(context.stages.loads, node)
     fall = free_fall(body, node, surroundings.gravity)
-    free = fall - times(surroundings.drag, point(velocities, node))
+    drag = surroundings.drag * body.drag[node]
+    free = fall - times(drag, point(velocities, node))
     total: Point = free + times(1.0 / body.masses[node], force)
     return total

@@ -39,7 +39,7 @@ def add_core_reactions(context: StepContext, positions: FloatArray, velocities: 
     pieces, body = context.cores.pieces, context.body
     free, external = context.stages.change, context.stages.external
     for core in range(len(pieces.begin) - 1):
-        now = rigid_motion(body, positions, pieces, core, velocities)
+        now = rigid_motion(body.masses, positions, pieces, core, velocities)
         members = range(pieces.begin[core], pieces.begin[core + 1])
         for k in members:
             i = pieces.node[k]
@@ -47,7 +47,7 @@ def add_core_reactions(context: StepContext, positions: FloatArray, velocities: 
             arm = sub(vec3(positions, i), now.centre)
             inward = cross(now.angular, cross(now.angular, arm))
             store(free, i, sub(vec3(free, i), inward))
-        rigid = rigid_motion(body, positions, pieces, core, free)
+        rigid = rigid_motion(body.masses, positions, pieces, core, free)
         for k in members:
             i = pieces.node[k]
             arm = sub(vec3(positions, i), rigid.centre)

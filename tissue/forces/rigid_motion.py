@@ -3,7 +3,8 @@
 Drag damps the slow modes of tissue, which viscosity barely reaches. It stands for what
 happens within tissue, and so acts on the motion of a piece less its rigid part, that with the same
 momentum and the same angular momentum as the piece has. What is left has neither, so that drag
-changes neither. A piece that is held somewhere has no rigid motion.
+changes neither. Where drag differs from label to label, momenta are those of mass times drag. A
+piece that is held somewhere has no rigid motion.
 """
 
 from typing import NamedTuple
@@ -36,12 +37,12 @@ class RigidMotion(NamedTuple):
 
 @kernel
 def rigid_motion(
-    body: Body, positions: FloatArray, pieces: LoosePieces, piece: int, motion: FloatArray
+    masses: FloatArray, positions: FloatArray, pieces: LoosePieces, piece: int, motion: FloatArray
 ) -> RigidMotion:
     """Return the rigid part of the motion of a piece: with its momentum and angular momentum.
 
     Args:
-        body: Masses.
+        masses: Mass of each node [kg], shape (capacity,).
         positions: Positions of the nodes [m].
         pieces: The pieces.
         piece: Which of them.
@@ -52,7 +53,7 @@ def rigid_motion(
     centre, linear = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
     for k in range(begin, end):
         i = pieces.node[k]
-        m = body.masses[i]
+        m = masses[i]
         mass += m
         centre = axpy(m, vec3(positions, i), centre)
         linear = axpy(m, vec3(motion, i), linear)
@@ -61,7 +62,7 @@ def rigid_motion(
     c0, c1, c2 = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
     for k in range(begin, end):
         i = pieces.node[k]
-        m = body.masses[i]
+        m = masses[i]
         r = sub(vec3(positions, i), centre)
         turned = axpy(m, cross(r, vec3(motion, i)), turned)
         rr = dot(r, r)
@@ -79,22 +80,30 @@ def rigid_motion(
 def add_rigid_part(
     body: Body, loose: LoosePieces, motion: FloatArray, factor: float, out: FloatArray
 ) -> None:
-    """Add the rigid part of the motion of loose pieces to `out`.
+    """Add the rigid part of the motion of loose pieces to `out`, for each node by its drag.
 
     Args:
         body: Masses and positions.
         loose: The loose pieces.
         motion: Velocity, or displacement, of each node; shape (capacity, 3).
-        factor: By which the rigid part is multiplied.
+        factor: By which the rigid part is multiplied where drag is highest.
         out: Where it is added, shape (capacity, 3).
     """
+    masses = body.masses
+    if body.materials.has_one_drag == 0:
+        # Drag on what is left of the motion has neither a resultant nor a torque.
+        masses = body.dragged_masses
+        for k in range(len(loose.node)):
+            i = loose.node[k]
+            masses[i] = body.masses[i] * body.drag[i]
     for piece in range(len(loose.begin) - 1):
-        rigid = rigid_motion(body, body.positions, loose, piece, motion)
+        rigid = rigid_motion(masses, body.positions, loose, piece, motion)
         for k in range(loose.begin[piece], loose.begin[piece + 1]):
             i = loose.node[k]
             r = sub(vec3(body.positions, i), rigid.centre)
             at = add(rigid.linear, cross(rigid.angular, r))
-            store_point(out, i, point(out, i) + times(factor, point_of(at.x, at.y, at.z)))
+            share = factor * body.drag[i]
+            store_point(out, i, point(out, i) + times(share, point_of(at.x, at.y, at.z)))
 
 
 @kernel

@@ -136,7 +136,7 @@ def hold_cores(context: StepContext, positions: FloatArray, velocities: FloatArr
     for core in range(len(cores.pieces.begin) - 1):
         pose = pose_of_core(body, cores, core, positions)
         _place(context, core, pose, positions)
-        motion = rigid_motion(body, positions, cores.pieces, core, velocities)
+        motion = rigid_motion(body.masses, positions, cores.pieces, core, velocities)
         _move(cores, core, motion, positions, velocities)
 
 
@@ -153,7 +153,7 @@ def drift_cores(context: StepContext, seconds: float) -> None:
         for k in range(pieces.begin[core], pieces.begin[core + 1]):
             i = pieces.node[k]
             store(x, i, axpy(-seconds, vec3(v, i), vec3(x, i)))
-        motion = rigid_motion(body, x, pieces, core, v)
+        motion = rigid_motion(body.masses, x, pieces, core, v)
         before = pose_of_core(body, cores, core, x)
         momentum = _angular_momentum(before, motion.angular)
         middle, inertia = before.middle, before.inertia
@@ -202,7 +202,7 @@ def change_cores_as_one(context: StepContext, change: FloatArray) -> None:
     """Make changes of the velocities of the nodes of cores [m/s] rigid, with the same momenta."""
     body, cores = context.body, context.cores
     for core in range(len(cores.pieces.begin) - 1):
-        motion = rigid_motion(body, body.positions, cores.pieces, core, change)
+        motion = rigid_motion(body.masses, body.positions, cores.pieces, core, change)
         _move(cores, core, motion, body.positions, change)
 
 

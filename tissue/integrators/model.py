@@ -32,7 +32,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.material_table import MaterialArrays
-from tissue.mesh.node_friction import write_friction
+from tissue.mesh.node_means import write_node_means
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 from tissue.mesh.rigid_cores import RigidCores
 from tissue.mesh.star import LARGEST_STAR, mean_node_size, no_visits
@@ -44,7 +44,7 @@ usual run. Finding them costs half a step of the integrator. Until then a piece 
 loose is taken as held, and drag slows its fall."""
 
 
-_WRITE_FRICTION = SameTypes(write_friction)
+_WRITE_MEANS = SameTypes(write_node_means)
 
 
 class Numerics(NamedTuple):
@@ -86,7 +86,7 @@ class TissueModel:
         self.body = body
         self.surroundings = Surroundings(
             gravity=gravity,
-            drag=float(material.viscous_damping),
+            drag=float(body.materials.viscous_damping.max()),
             retardation_time=float(body.materials.retardation_time.max()),
         )
         """Gravity and all damping."""
@@ -101,7 +101,7 @@ class TissueModel:
             resists_collapse=numerics.moves_together,
         )
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
-        self._write_friction(np.arange(body.n_nodes))
+        self._write_node_means(np.arange(body.n_nodes))
         self.node_size = mean_node_size(body, self.visits, self._around)
         """Mean node size of the body before any cut [m]."""
         self.interaction = BladeInteraction(blade, material, self.node_size, body.n_tetrahedra)
@@ -148,17 +148,19 @@ class TissueModel:
         self.body = self.body.replaced(materials=materials)
         self.elasticity.take_materials(self.body, self.visits)
         self.interaction.take_materials(materials)
-        self._write_friction(np.arange(self.body.n_nodes))
+        self.body.drag[:] = 1.0
+        self._write_node_means(np.arange(self.body.n_nodes))
         self.contact.take_friction(float(materials.friction[0]))
         self.geoms.search.is_due = 1
         self.contact.take_frequency(self.elasticity.frequency_squared)
         longest = float(materials.retardation_time.max())
-        self.surroundings = self.surroundings.replaced(retardation_time=longest)
+        drag = float(materials.viscous_damping.max())
+        self.surroundings = self.surroundings.replaced(retardation_time=longest, drag=drag)
         self._set_damping()
 
-    def _write_friction(self, nodes: IntArray) -> None:
-        """Write the friction of nodes whose tetrahedra are other ones, or of other materials."""
-        _WRITE_FRICTION.call(self.body, self.visits, nodes, len(nodes), self._around)
+    def _write_node_means(self, nodes: IntArray) -> None:
+        """Write means around nodes whose tetrahedra are other ones, or of other materials."""
+        _WRITE_MEANS.call(self.body, self.visits, nodes, len(nodes), self._around)
 
     def _set_damping(self) -> None:
         """Divide damping into that in the stages of a step, and that between steps."""
@@ -280,7 +282,7 @@ class TissueModel:
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
         """Find loose pieces again some increments later, and the friction of the nodes."""
-        self._write_friction(changed.nodes)
+        self._write_node_means(changed.nodes)
         if self.increments_to_pieces == 0:
             self.increments_to_pieces = INCREMENTS_TO_PIECES
 

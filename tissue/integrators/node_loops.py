@@ -219,7 +219,8 @@ def second_stage(context: StepContext, h: float, begin: int, end: int) -> None:
             store_point(stages.a2, i, a2)
             store_point(stages.change, i, change)
         else:
-            a3 = a2 if body.fixed[i] else a2 - times(surroundings.drag, change)
+            drag = surroundings.drag * body.drag[i]
+            a3 = a2 if body.fixed[i] else a2 - times(drag, change)
             _positions_and_velocities(body, stages, i, a2, a3, h)
 
 
@@ -235,7 +236,8 @@ def third_stage(context: StepContext, h: float, begin: int, end: int) -> None:
         if not body.fixed[i]:
             viscous = viscous_force(context.elastic, i, stages.positions, stages.change, time)
             a3 = a2 + times(1.0 / body.masses[i], viscous)
-            a3 = a3 - times(surroundings.drag, point(stages.change, i))
+            drag = surroundings.drag * body.drag[i]
+            a3 = a3 - times(drag, point(stages.change, i))
         _positions_and_velocities(body, stages, i, a2, a3, h)
 
 
@@ -378,7 +380,7 @@ def damping_changes(context: StepContext, seconds: float, begin: int, end: int) 
         i = natural(node)
         change = point_of(0.0, 0.0, 0.0)
         if not body.fixed[i]:
-            change = times(-drag, point(v, i))
+            change = times(-drag * body.drag[i], point(v, i))
             if time > 0.0:
                 force = viscous_force(context.elastic, i, x, v, time)
                 change = change + times(1.0 / body.masses[i], force)

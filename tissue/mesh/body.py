@@ -55,8 +55,13 @@ class Body(Arrays):
     fixed: BoolArray = sized("nodes")
     """Whether each node is fixed, shape (capacity,)."""
     friction: FloatArray = sized("nodes")
-    """Coefficient of friction around each node, where materials differ in it
-    (`tissue.mesh.node_friction`); shape (capacity,)."""
+    """Coefficient of friction around each node, where materials differ in friction or drag
+    (`tissue.mesh.node_means`); shape (capacity,)."""
+    drag: FloatArray = sized("nodes", fill=1.0)
+    """Drag around each node over the highest of the body, exactly 1 where materials have the same;
+    shape (capacity,)."""
+    dragged_masses: FloatArray = sized("nodes")
+    """Scratch of `tissue.forces.rigid_motion`: masses times `drag`, where it differs."""
     off_path: FloatArray = sized("nodes")
     """Distance of a cut's node from where the blade passed [m], the largest of several cuts; 0 for
     other nodes, -1 where no blade passed but a bridge was finished; shape (capacity,)."""

@@ -13,7 +13,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
 from tissue.laws.energy_density import EnergyDensity, averaged_shear
-from tissue.material import Material
+from tissue.material import MOST_TERMS, Material
 
 OF_LAW = ("mu", "lam_of_tetrahedra", "lam_of_nodes", "shear_modulus", "excess")
 """Moduli of the energy density [Pa], all of which are in proportion to Young's modulus."""
@@ -21,7 +21,18 @@ OF_LAW = ("mu", "lam_of_tetrahedra", "lam_of_nodes", "shear_modulus", "excess")
 OF_STIFFENING = ("exponent", "second", "third")
 """Numbers of laws that stiffen."""
 
-ELASTIC = ("young_modulus", "spring_modulus", "retardation_time", *OF_LAW, *OF_STIFFENING)
+SHARES = tuple(f"share_{term + 1}" for term in range(MOST_TERMS))
+"""g of the terms of a Prony series."""
+
+TIMES = tuple(f"time_{term + 1}" for term in range(MOST_TERMS))
+"""tau of these terms [s]."""
+
+_NO_TERM = (0.0, 1.0)
+"""g and tau of a term that a material does not have: nothing relaxes, in any time."""
+
+_OF_FORCES = ("young_modulus", "spring_modulus", "retardation_time")
+
+ELASTIC = (*_OF_FORCES, *OF_LAW, *OF_STIFFENING, *SHARES, *TIMES)
 """Columns from which the forces inside the body follow."""
 
 SCALED: dict[str, tuple[str, ...]] = {
@@ -30,6 +41,7 @@ SCALED: dict[str, tuple[str, ...]] = {
     "toughness": ("toughness", "skin_toughness", "work_to_rupture"),
     "stiffening": OF_STIFFENING,
     "retardation_time": ("retardation_time",),
+    "viscous_damping": ("viscous_damping",),
     "friction": ("friction",),
     "blade_friction": ("blade_friction",),
     "blade_viscosity": ("blade_viscosity",),
@@ -44,6 +56,8 @@ class MaterialArrays(Arrays):
     """1 where forces inside the body are those of one material, else 0."""
     has_one_friction: IntCell
     """1 where all have the same coefficient of friction, else 0."""
+    has_one_drag: IntCell
+    """1 where all have the same drag, else 0."""
     label: IntArray = sized("materials")
     """Label of the tetrahedra: which part of the body they are."""
     young_modulus: FloatArray = sized("materials")
@@ -66,6 +80,8 @@ class MaterialArrays(Arrays):
     """Exponent with which toughness rises with the speed of the cut."""
     toughness_speed: FloatArray = sized("materials")
     """Speed at which toughness is twice that of a slow cut [m/s]."""
+    viscous_damping: FloatArray = sized("materials")
+    """Drag, as the rate at which slow motion dies away [1/s]."""
     friction: FloatArray = sized("materials")
     """Coefficient of friction between faces of the tissue, and on the floor."""
     blade_friction: FloatArray = sized("materials")
@@ -88,6 +104,18 @@ class MaterialArrays(Arrays):
     """`EnergyDensity.second`."""
     third: FloatArray = sized("materials")
     """`EnergyDensity.third`."""
+    share_1: FloatArray = sized("materials")
+    """g of the first term of the Prony series; 0 where there is none, as of the next two."""
+    share_2: FloatArray = sized("materials")
+    """g of the second."""
+    share_3: FloatArray = sized("materials")
+    """g of the third."""
+    time_1: FloatArray = sized("materials")
+    """tau of the first term [s]."""
+    time_2: FloatArray = sized("materials")
+    """tau of the second [s]."""
+    time_3: FloatArray = sized("materials")
+    """tau of the third [s]."""
 
     @classmethod
     def of(
@@ -115,6 +143,10 @@ class MaterialArrays(Arrays):
         for name in cls.quantities():
             if name in (*OF_LAW, *OF_STIFFENING):
                 columns.append([_of_density(density, name) for density in densities])
+            elif name in SHARES:
+                columns.append([_term(each, SHARES.index(name))[0] for each in materials])
+            elif name in TIMES:
+                columns.append([_term(each, TIMES.index(name))[1] for each in materials])
             else:
                 columns.append([float(getattr(each, name)) for each in materials])
         return cls.of_rows(np.array([labels, *columns], dtype=np.float64).T)
@@ -122,7 +154,7 @@ class MaterialArrays(Arrays):
     @classmethod
     def quantities(cls) -> tuple[str, ...]:
         """Return the names of all columns but the label."""
-        others = ("is_even", "has_one_friction", "label")
+        others = ("is_even", "has_one_friction", "has_one_drag", "label")
         return tuple(name for name in cls.__annotations__ if name not in others)
 
     @property
@@ -137,6 +169,17 @@ class MaterialArrays(Arrays):
         ratio = (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
         return float(np.sqrt(self.young_modulus * ratio / self.density).max())
 
+    @property
+    def series(self) -> tuple[FloatArray, FloatArray]:
+        """G and tau [s] of each term of each Prony series, shape (n_terms, n_materials).
+
+        There are as many terms as the longest series has.
+        """
+        shares = np.array([getattr(self, name) for name in SHARES])
+        times = np.array([getattr(self, name) for name in TIMES])
+        n_terms = int(shares.any(axis=1).sum())
+        return shares[:n_terms], times[:n_terms]
+
     def rows(self) -> FloatArray:
         """Return the table as one array, the labels first, shape (n_materials, n_columns)."""
         columns = [self.label.astype(np.float64), *(getattr(self, n) for n in self.quantities())]
@@ -150,6 +193,7 @@ class MaterialArrays(Arrays):
         return cls(
             is_even=int(all(_is_one(named[name]) for name in ELASTIC)),
             has_one_friction=int(_is_one(named["friction"])),
+            has_one_drag=int(_is_one(named["viscous_damping"])),
             label=label.astype(np.int64),
             **named,
         )
@@ -158,6 +202,11 @@ class MaterialArrays(Arrays):
 def _is_one(column: FloatArray) -> bool:
     """Return whether all numbers of a column are the same."""
     return bool((column == column[0]).all())
+
+
+def _term(material: Material, term: int) -> tuple[float, float]:
+    """Return g and tau [s] of a term of the Prony series of a material."""
+    return material.prony[term] if term < len(material.prony) else _NO_TERM
 
 
 def _of_density(density: EnergyDensity | None, name: str) -> float:

@@ -78,7 +78,7 @@ _POOLS: Mapping[str, Mapping[str, Sequence[str]]] = {
 _OF_NODES = {
     "Body": (
         *("rest", "lattice_rest", "positions", "velocities", "masses", "added_masses", "fixed"),
-        *("friction", "off_path", "node_tetrahedron", "twin"),
+        *("friction", "drag", "off_path", "node_tetrahedron", "twin"),
     ),
     "Solid": (
         *("first", "room", "count", "node_volume", "weight", "dilatation", "frequency_squared"),
@@ -166,9 +166,9 @@ def _of_solid(solid: Any, body: Arrays) -> Iterable[RowsInUse]:
     n, width = (body, "n_tetrahedra"), 64 // solid.shape.itemsize
     for field, elements in _IN_BLOCKS.items():
         yield RowsInUse(solid, field, n, elements, width)
-    yield RowsInUse(solid, "relaxed_terms", n, 7 * len(solid.relaxation_times), width)
+    yield RowsInUse(solid, "relaxed_terms", n, 7 * solid.n_terms, width)
     if len(solid.node_relaxed):
-        nodes, terms = (body, "n_nodes"), 7 * len(solid.relaxation_times)
+        nodes, terms = (body, "n_nodes"), 7 * solid.n_terms
         yield RowsInUse(solid, "node_relaxed", nodes, 7, width)
         yield RowsInUse(solid, "node_relaxed_terms", nodes, terms, width)
     for field in _BEHIND_A_BLOCK:

@@ -164,7 +164,7 @@ def test_nodes_in_one_line_do_not_turn(body):
     loose = LoosePieces(node=np.arange(3), begin=np.array([0, 3]))
     field = room_for_points(len(body.rest))
     field[:3] = SPEED
-    found = rigid_motion(body, body.positions, loose, 0, field)
+    found = rigid_motion(body.masses, body.positions, loose, 0, field)
     assert found.angular == (0.0, 0.0, 0.0)
     assert found.linear == pytest.approx(tuple(SPEED))
 

@@ -29,7 +29,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.mesh.body import Body
-from tissue.mesh.node_friction import friction_of_row
+from tissue.mesh.node_means import friction_of_row
 
 _PUSH_OF_FACE: Final = 0.03
 """Share of its depth by which a face is put out of a geom in a substep; a node is so wholly. Faces

@@ -27,7 +27,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
 from tissue.mesh.body import Body
-from tissue.mesh.node_friction import friction_of_row
+from tissue.mesh.node_means import friction_of_row
 
 _ROOM_SHARE = 0.5
 """Share of the room between a node's own bound on w^2 and the highest that its contacts may use.

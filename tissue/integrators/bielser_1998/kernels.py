@@ -196,7 +196,7 @@ def _move(context: StepContext, local_clocks: LocalClocks, node: int, t1: float)
     t0 = local_clocks.clocks[node]
     h = t1 - t0
     x, v = point(body.positions, node), point(body.velocities, node)
-    time, drag = surroundings.retardation_time, surroundings.drag
+    time, drag = surroundings.retardation_time, surroundings.drag * body.drag[node]
     per_mass = 1.0 / body.masses[node]
     external = point(context.stages.external, node) + point(context.stages.loads, node)
     constant = point_of(*surroundings.gravity) + times(per_mass, external)
