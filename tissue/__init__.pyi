@@ -49,6 +49,7 @@ from .laws.yeoh import Yeoh as Yeoh
 from .loads.attachment import Attachment as Attachment
 from .loads.attachment import FramePath as FramePath
 from .loads.attachment import Ligament as Ligament
+from .loads.facing import Facing as Facing
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
 from .loads.support_path import SupportPath as SupportPath
@@ -110,6 +111,7 @@ __all__ = [
     "DAMPING_BAND",
     "Deformation",
     "Energies",
+    "Facing",
     "FloatArray",
     "Geom",
     "GeomContact",

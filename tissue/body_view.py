@@ -1,22 +1,24 @@
 """Views of a body: copies of its state, its pieces, the boxes around it, quantities at its skin."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.elasticity.internal_forces import Elastic
 from tissue.fields.node_fields import largest_principal_strains, von_mises_stresses
 from tissue.fields.tetrahedron_fields import strains_of_tetrahedra, stresses_of_tetrahedra
 from tissue.integrators.model import TissueModel
-from tissue.loads.material_points import MaterialPoints, points_of
+from tissue.loads.facing import Facing, facing_points
+from tissue.loads.material_points import MaterialPoints, points_of, region_mask
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.parts import labels_of_part
 from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.mesh.rigid_cores import CoreMotion
 from tissue.mesh.surface import boundary_nodes, boundary_surface
@@ -48,6 +50,19 @@ def snapshot_of(body: Body) -> Snapshot:
 def labels_of(body: Body) -> IntArray:
     """Return the label of each tetrahedron of a body, shape (n_tets,)."""
     return np.asarray(body.materials.label[body.material[: body.n_tetrahedra]])
+
+
+def tetrahedra_of(body: Body, names: Mapping[int, str], part: int | str | BoolArray) -> BoolArray:
+    """Return which tetrahedra are of a part, shape (n_tets,): see `BodyView.facing`.
+
+    Raises:
+        ValueError: there is no such part, or the mask has another shape.
+    """
+    labels = labels_of(body)
+    if isinstance(part, (int, np.integer, str)):
+        return np.isin(labels, labels_of_part(np.unique(labels).tolist(), names, part))
+    nodes = region_mask(body, np.asarray(part))
+    return np.asarray(nodes[body.tetrahedra[: body.n_tetrahedra]].any(axis=1))
 
 
 def n_pieces_of(body: Body) -> int:
@@ -134,6 +149,8 @@ class BodyView:
 
     material: Material
     """Material of the body; of several that which resists changes of volume most."""
+    label_names: Mapping[int, str]
+    """Names of labels, of those that have one."""
     _model: TissueModel
 
     @property
@@ -193,6 +210,24 @@ class BodyView:
             ValueError: no point is there, or one is outside the body.
         """
         return points_of(self._body, where)
+
+    def facing(
+        self, one: int | str | BoolArray, other: int | str | BoolArray, *, within: float = 1e-3
+    ) -> Facing:
+        """Return the skin of one body that faces that of another at rest, for `Tissue.tie`.
+
+        Args:
+            one: A label, by number or name; one of several bodies, by name; or a mask of nodes,
+                shape (n_nodes,): the tetrahedra that have one of them.
+            other: The other body, likewise.
+            within: Farthest distance between the two [m].
+
+        Raises:
+            ValueError: there is no such part, or none of its skin is so near and faces the other.
+        """
+        body, names = self._body, self.label_names
+        mine, theirs = (tetrahedra_of(body, names, part) for part in (one, other))
+        return facing_points(body, mine, theirs, within)
 
     def positions_of(self, points: MaterialPoints) -> FloatArray:
         """Return where material points are now [m], shape (n, 3)."""

@@ -14,7 +14,7 @@ from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.memento import Spares
 from tissue.core.three_vectors import BladeSweep
 from tissue.cut_settings import CutReport
-from tissue.loads.attachment import Attachment, Ligament, ends_of_fibres
+from tissue.loads.attachment import Attachment, Ligament
 from tissue.loads.load import Load
 from tissue.loads.material_points import MaterialPoints
 from tissue.loads.support_path import SupportPath
@@ -183,7 +183,7 @@ class Tissue(BodyView):
     def tie(
         self,
         where: str | npt.ArrayLike | MaterialPoints,
-        to: npt.ArrayLike,
+        to: npt.ArrayLike | MaterialPoints,
         *,
         stiffness: float,
         area: float,
@@ -192,14 +192,15 @@ class Tissue(BodyView):
         rest_length: float | None = None,
         breaks_at: float = math.inf,
     ) -> Ligament:
-        """Tie points of the tissue by fibres to places in the world; return the ligament.
+        """Tie points of the tissue by fibres to the world, or to another body; return the ligament.
 
         The edge of the blade cuts the fibres that it sweeps across (`tissue.forces.fibres`):
-        cross-section times toughness is in `Energies.breaking`.
+        cross-section times toughness is in `Energies.breaking`. Fibres between bodies tear too.
 
         Args:
             where: Points as `attach` takes them.
-            to: Where the fibres end [m], shape (3,), or one place for each point, (n, 3).
+            to: Where the fibres end [m], shape (3,), or one place for each point, (n, 3); or points
+                of the tissue, one or one for each, such as those of `facing`.
             stiffness: Of all fibres together, along them [N/m].
             area: Cross-section of all fibres together [m2].
             toughness: Energy of cutting them [J/m2].
@@ -210,9 +211,8 @@ class Tissue(BodyView):
         Raises:
             ValueError: see `attach`; or `to` has another shape.
         """
-        points = self._stages.handles.points_to_hold(where)
-        ends = ends_of_fibres(self.positions_of(points), to, rest_length)
-        ligament = Ligament(points, *ends, stiffness, area, toughness, damping, breaks_at)
+        numbers = stiffness, area, toughness, damping, breaks_at
+        ligament = self._stages.handles.ligament(where, to, rest_length, numbers)
         return self._steps.begin_change().handles.attach(ligament)
 
     def collide_with(

@@ -177,6 +177,8 @@ def _attach(tissue: Tissue, mesh: TetrahedralMesh, table: AttachmentTable) -> At
     """Make one attachment, or ligament."""
     where = _region(mesh, table)
     breaks_at = math.inf if table.breaks_at is None else table.breaks_at
+    if table.to_body is not None:
+        return _tie_bodies(tissue, table, where, breaks_at)
     if table.to is None:
         return tissue.attach(
             where,
@@ -194,6 +196,25 @@ def _attach(tissue: Tissue, mesh: TetrahedralMesh, table: AttachmentTable) -> At
         rest_length=table.rest_length,
         breaks_at=breaks_at,
         area=table.area,
+        toughness=table.toughness,
+    )
+
+
+def _tie_bodies(
+    tissue: Tissue, table: AttachmentTable, where: str | BoolArray, breaks_at: float
+) -> Attachment:
+    """Tie the skin of a region to that of another body, which faces it."""
+    assert table.to_body is not None and table.toughness is not None
+    assert not isinstance(where, str)  # it is of one body
+    facing = tissue.facing(where, table.to_body, within=table.within)
+    return tissue.tie(
+        facing.points,
+        facing.others,
+        stiffness=table.stiffness,
+        damping=table.damping,
+        rest_length=table.rest_length,
+        breaks_at=breaks_at,
+        area=facing.area if table.area is None else table.area,
         toughness=table.toughness,
     )
 

@@ -197,6 +197,9 @@ def check_label(table: LabelTable, where: str) -> None:
 
 def check_attachment(table: AttachmentTable, where: str) -> None:
     """Check that the keys of an attachment make sense together: see `check_rows`."""
+    if table.to_body is not None:
+        _check_tie(table, where)
+        return
     for key in _OF_LIGAMENT:
         if (getattr(table, key) is None) != (table.to is None):
             given, missing = (key, "to") if table.to is None else ("to", key)
@@ -227,6 +230,19 @@ def check_attachment(table: AttachmentTable, where: str) -> None:
         raise UsageError(f"{where} has times {table.times}; they begin above 0 and increase")
 
 
+def _check_tie(table: AttachmentTable, where: str) -> None:
+    """Check that an attachment that ties two bodies has all that it needs, and no frame."""
+    if table.body is None or table.body == table.to_body:
+        raise UsageError(
+            f"{where} has to_body and no other body; body is the one that it begins at"
+        )
+    if table.toughness is None:
+        raise UsageError(f"{where} has to_body and no toughness, the energy of cutting it [J/m2]")
+    for key in ("to", "displacements", "times", "speed"):
+        if getattr(table, key) is not None:
+            raise UsageError(f"{where} has to_body and {key}; what ties two bodies moves with them")
+
+
 def check_parts(bodies: Sequence[str], arrays: Mapping[str, Sequence[Any]]) -> None:
     """Check that rows that are about a part name a body that there is.
 
@@ -240,10 +256,11 @@ def check_parts(bodies: Sequence[str], arrays: Mapping[str, Sequence[Any]]) -> N
     for kind, rows in arrays.items():
         for i, row in enumerate(rows):
             where = f"[[{kind}]] number {i + 1}"
-            if row.body is not None and row.body not in bodies:
-                if not bodies:
-                    raise UsageError(f"{where} has a body, and the scene has one; omit it")
-                raise UsageError(f"{where}: {unknown('body', row.body, bodies)}")
+            for name in (row.body, getattr(row, "to_body", None)):
+                if name is not None and name not in bodies:
+                    if not bodies:
+                        raise UsageError(f"{where} has a body, and the scene has one; omit it")
+                    raise UsageError(f"{where}: {unknown('body', name, bodies)}")
             is_own = isinstance(row, LabelTable) and (row.label, row.region) != (None, None)
             if bodies and is_own and row.body is None:
                 raise UsageError(

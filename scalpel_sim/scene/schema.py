@@ -260,7 +260,7 @@ class ArmTable(TomlTable, kw_only=True, frozen=True):
 
 
 class AttachmentTable(TomlTable, kw_only=True, frozen=True):
-    """`[[attachment]]`: springs from the nodes of a region to a frame; with `to`, a ligament."""
+    """`[[attachment]]`: springs from a region to a frame, or to a body; with `to`, a ligament."""
 
     where: Region
     """Region whose nodes it holds, as for `fixed`; of a box or a sphere also the nodes inside."""
@@ -271,15 +271,18 @@ class AttachmentTable(TomlTable, kw_only=True, frozen=True):
     damping: NotNegative = 0.0
     """Damping of all dampers together [N s/m]."""
     rest_length: NotNegative | None = None
-    """Length up to which each spring is slack [m]; 0 without, and of a ligament its length at
-    first."""
+    """Length up to which each is slack [m]; 0 without, and of a fibre its length at first."""
     breaks_at: Positive | None = None
     """Force at which it releases the tissue [N]; none without."""
     to: ThreeNumbers | None = None
     """Where the fibres of a [ligament](own_arm.md#ligaments) end [m]. It has `area` and
     `toughness` too."""
+    to_body: Text | None = None
+    """Body where they end instead: [a layer](#ties-between-bodies) between the two."""
+    within: Positive = 0.001
+    """Farthest distance of the skin that such a layer ties [m]."""
     area: Positive | None = None
-    """Cross-section of all fibres together [m2]."""
+    """Cross-section of all fibres together [m2]; of a layer the area of the skin that it ties."""
     toughness: Positive | None = None
     """Energy of cutting the fibres [J/m2]."""
     displacements: RowsOfThree | None = None

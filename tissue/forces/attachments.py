@@ -1,4 +1,4 @@
-"""Attachments: springs and dampers from material points to points that are moved from outside.
+"""Attachments: springs and dampers from material points to others, or to what moves from outside.
 
 They act in every stage of a step, like the blade: what holds tissue firmly would be unstable with
 forces that stay for a millisecond. The springs of a body's points add to the frequencies of its
@@ -6,7 +6,9 @@ nodes,
 
     K = sum_p k_p w_p w_p^T,   w^2 <= max_i (sum_p k_p w_pi) / m_i,
 
-by Gershgorin's circles, since the weights w_p of a point are not negative and add up to 1.
+by Gershgorin's circles, since the weights w_p of a point are not negative and add up to 1. Where
+both ends are in the tissue the row of a node holds the weights of the other end, too: twice as
+much, at either end.
 """
 
 import math
@@ -46,6 +48,12 @@ class Attachments(Arrays):
     """Nodes around each point, shape (n, 4)."""
     weights: FloatArray
     """Their barycentric weights, shape (n, 4)."""
+    is_tie: IntArray
+    """1 where the other end is a point of the tissue, too, else 0; shape (n,)."""
+    other_nodes: IntArray
+    """Nodes around that point, shape (n, 4)."""
+    other_weights: FloatArray
+    """Their barycentric weights, shape (n, 4): 0 where it is none."""
     begin: FloatArray
     """What each is attached to, at the begin of the time step [m], shape (n, 3)."""
     end: FloatArray
@@ -90,6 +98,9 @@ def no_attachments(n: int = 0) -> Attachments:
         released=0.0,
         nodes=np.zeros((n, 4), dtype=np.int64),
         weights=np.zeros((n, 4)),
+        is_tie=np.zeros(n, dtype=np.int64),
+        other_nodes=np.zeros((n, 4), dtype=np.int64),
+        other_weights=np.zeros((n, 4)),
         begin=np.zeros((n, 3)),
         end=np.zeros((n, 3)),
         stiffness=np.zeros(n),
@@ -118,6 +129,55 @@ def attached_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Ve
 
 
 @kernel
+def other_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Vec3:
+    """Return what nodes have at the other end of a tie, point `p`."""
+    x = Vec3(0.0, 0.0, 0.0)
+    for q in range(4):
+        node = attachments.other_nodes[p, q]
+        x = axpy(attachments.other_weights[p, q], vec3(of_nodes, node), x)
+    return x
+
+
+@kernel
+def other_end(attachments: Attachments, p: int, positions: FloatArray, when: float) -> Vec3:
+    """Return where the other end of what holds point `p` is [m].
+
+    Args:
+        attachments: All of them.
+        p: The point.
+        positions: Positions of the nodes at that instant [m].
+        when: The instant, as a fraction of the time step.
+    """
+    if attachments.is_tie[p] == 1:
+        return other_point(attachments, p, positions)
+    return lerp(when, vec3(attachments.begin, p), vec3(attachments.end, p))
+
+
+@kernel
+def end_after_step(attachments: Attachments, p: int, positions: FloatArray) -> Vec3:
+    """Return where the other end of what holds point `p` is after a step of the integrator [m]."""
+    if attachments.is_tie[p] == 1:
+        return other_point(attachments, p, positions)
+    return vec3(attachments.end, p)
+
+
+@kernel
+def other_motion(attachments: Attachments, p: int, velocities: FloatArray, dt: float) -> Vec3:
+    """Return how far the other end of what holds point `p` moves in a time step `dt` [m]."""
+    if attachments.is_tie[p] == 1:
+        return scale(dt, other_point(attachments, p, velocities))
+    return sub(vec3(attachments.end, p), vec3(attachments.begin, p))
+
+
+@kernel
+def pull_other_end(attachments: Attachments, p: int, force: Vec3, external: FloatArray) -> None:
+    """Add a force on the other end of a tie [N] to those on the nodes around it."""
+    for q in range(4):
+        node, weight = attachments.other_nodes[p, q], attachments.other_weights[p, q]
+        store(external, node, axpy(weight, force, vec3(external, node)))
+
+
+@kernel
 def spread_force(attachments: Attachments, p: int, force: Vec3, external: FloatArray) -> None:
     """Add a force on point `p` [N] to those on the nodes around it."""
     for q in range(4):
@@ -127,11 +187,13 @@ def spread_force(attachments: Attachments, p: int, force: Vec3, external: FloatA
 
 @kernel
 def clear_attachment_forces(attachments: Attachments, external: FloatArray) -> None:
-    """Set the forces on the nodes around attached points to zero."""
+    """Set the forces on the nodes around attached points, and the other ends of ties, to zero."""
     nodes = attachments.nodes
     for p in range(len(nodes)):
         for q in range(4):
             store(external, nodes[p, q], Vec3(0.0, 0.0, 0.0))
+            if attachments.is_tie[p] == 1:
+                store(external, attachments.other_nodes[p, q], Vec3(0.0, 0.0, 0.0))
 
 
 @kernel
@@ -162,12 +224,15 @@ def add_attachment_forces(
             continue
         x = attached_point(attachments, p, positions)
         v = attached_point(attachments, p, velocities)
-        begin, end = vec3(attachments.begin, p), vec3(attachments.end, p)
-        path = sub(lerp(when, begin, end), x)
-        pull = _pull(attachments, p, path, axpy(-dt, v, sub(end, begin)), dt)
+        path = sub(other_end(attachments, p, positions, when), x)
+        of_end = other_motion(attachments, p, velocities, dt)
+        pull = _pull(attachments, p, path, axpy(-dt, v, of_end), dt)
         seconds = share * dt
         count_impulse(attachments, p, x, scale(seconds, pull.force))
-        attachments.work += share * dot(pull.force, sub(end, begin))
+        if attachments.is_tie[p] == 1:
+            pull_other_end(attachments, p, scale(-1.0, pull.force), external)
+        else:
+            attachments.work += share * dot(pull.force, of_end)
         attachments.dissipated += seconds * pull.lost
         spread_force(attachments, p, pull.force, external)
 
@@ -249,7 +314,8 @@ def attached_energy(attachments: Attachments, positions: FloatArray, begin: int,
     for p in range(begin, end):
         if attachments.state[p] == SEVERED:
             continue
-        x, other = attached_point(attachments, p, positions), vec3(attachments.end, p)
+        x = attached_point(attachments, p, positions)
+        other = end_after_step(attachments, p, positions)
         if attachments.state[p] == CAUGHT:
             bend = vec3(attachments.bend, p)
             total += holding_energy(attachments, p, norm(sub(x, bend)) + norm(sub(other, bend)))
@@ -286,8 +352,14 @@ def frequency_squared(
 
 def _largest_rate(attachments: Attachments, each: FloatArray, masses: FloatArray) -> float:
     """Return the largest sum of a quantity of points over the mass of a node."""
-    touched, places = np.unique(attachments.nodes, return_inverse=True)
-    shares = each[:, None] * attachments.weights
+    nodes, shares = attachments.nodes, each[:, None] * attachments.weights
+    ties = attachments.is_tie == 1
+    if ties.any():
+        of_others = each[ties, None] * attachments.other_weights[ties]
+        shares[ties] *= 2.0
+        nodes = np.concatenate([nodes, attachments.other_nodes[ties]])
+        shares = np.concatenate([shares, 2.0 * of_others])
+    touched, places = np.unique(nodes, return_inverse=True)
     sums = np.bincount(places.ravel(), weights=shares.ravel())
     return float((sums / masses[touched]).max())
 
@@ -302,7 +374,10 @@ def fibre_boxes(attachments: Attachments, positions: FloatArray) -> FloatArray:
     rows = np.flatnonzero((attachments.section > 0.0) & (attachments.state != SEVERED))
     nodes, weights = attachments.nodes[rows], attachments.weights[rows]
     points = np.einsum("nk,nkx->nx", weights, positions[nodes])
+    others, of_others = attachments.other_nodes[rows], attachments.other_weights[rows]
+    inside = np.einsum("nk,nkx->nx", of_others, positions[others])
+    far = np.where(attachments.is_tie[rows, None] == 1, inside, attachments.end[rows])
     is_caught = attachments.state[rows, None] == CAUGHT
     bends = np.where(is_caught, attachments.bend[rows], points)
-    ends = np.stack((points, attachments.end[rows], bends), axis=1)
+    ends = np.stack((points, far, bends), axis=1)
     return np.stack((ends.min(axis=1), ends.max(axis=1)), axis=1)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 from tissue.blade.edge import LEAST_SINE, BladePose, Edge, pose_at
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, cross, dot, lerp, sub, vec3
-from tissue.forces.attachments import STRAIGHT, Attachments, attached_point
+from tissue.core.vec3 import Vec3, cross, dot, lerp, sub
+from tissue.forces.attachments import STRAIGHT, Attachments, attached_point, other_end
 from tissue.forces.fibres import catch_fibre
 
 
@@ -15,7 +15,7 @@ def note_fibres(fibres: Attachments, positions: FloatArray, when: float) -> None
     """Note where the ends of all fibres are [m], before an increment."""
     for p in range(len(fibres.nodes)):
         x = attached_point(fibres, p, positions)
-        other = lerp(when, vec3(fibres.begin, p), vec3(fibres.end, p))
+        other = other_end(fibres, p, positions, when)
         for axis in range(3):
             fibres.before[p, axis], fibres.before[p, 3 + axis] = x[axis], other[axis]
 
@@ -44,7 +44,7 @@ def catch_fibres(
         row = fibres.before[p]
         x0, end0 = Vec3(row[0], row[1], row[2]), Vec3(row[3], row[4], row[5])
         x1 = attached_point(fibres, p, positions)
-        end1 = lerp(end, vec3(fibres.begin, p), vec3(fibres.end, p))
+        end1 = other_end(fibres, p, positions, end)
         volume0, volume1 = _volume(first, x0, end0), _volume(last, x1, end1)
         side0 = fibres.side[p] if fibres.side[p] != 0.0 else _side_of(volume0)
         fibres.side[p] = _side_of(volume1)

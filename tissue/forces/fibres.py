@@ -19,8 +19,7 @@ is round: its diameter is 2 sqrt(A / pi). An impulse of the whole energy in one 
 be E / v on a blade of speed v: unbounded on a slow one.
 """
 
-import math
-from typing import Final, NamedTuple
+from typing import Final
 
 from tissue.blade.blade_state import RunningTotals, add_reaction, running_totals, store_totals
 from tissue.blade.edge import (
@@ -43,10 +42,15 @@ from tissue.forces.attachments import (
     Attachments,
     attached_point,
     count_impulse,
+    end_after_step,
     holding_energy,
+    other_end,
+    other_motion,
+    pull_other_end,
     spread_force,
     tension_of,
 )
+from tissue.forces.fibre_shape import bent_fibre, cutting_resistance, end_zone
 from tissue.forces.step_context import StepContext
 
 _ROUNDING: Final = 1e-9
@@ -58,42 +62,6 @@ _DOUBLINGS: Final = 64
 
 _HALVINGS: Final = 50
 """Halvings of an interval, which then is shorter than the rounding of its ends."""
-
-
-class _Bent(NamedTuple):
-    """A fibre that goes around a bend."""
-
-    to_point: Vec3
-    """Unit vector from the bend to the point of the tissue."""
-    to_end: Vec3
-    """Unit vector from the bend to the other end."""
-    length: float
-    """Length of the fibre [m]."""
-
-
-@kernel
-def _radius(attachments: Attachments, p: int) -> float:
-    """Return the radius of fibre `p` [m]."""
-    return math.sqrt(attachments.section[p] / math.pi)
-
-
-@kernel
-def _resistance(fibres: Attachments, p: int) -> float:
-    """Return the force at which the edge goes into fibre `p` [N]."""
-    force: float = fibres.toughness[p] * fibres.section[p] / (2.0 * _radius(fibres, p))
-    return force
-
-
-@kernel
-def _bent(attachments: Attachments, p: int, x: Vec3, bend: Vec3, end: Vec3) -> _Bent:
-    """Return fibre `p` from `x` around a bend to its other end [m].
-
-    Nearer to an end than its radius a fibre has no direction: there the vectors are shorter.
-    """
-    radius = _radius(attachments, p)
-    a, b = sub(x, bend), sub(end, bend)
-    la, lb = norm(a), norm(b)
-    return _Bent(scale(1.0 / max(la, radius), a), scale(1.0 / max(lb, radius), b), la + lb)
 
 
 @kernel
@@ -129,13 +97,13 @@ def add_caught_forces(
         if fibres.state[p] != CAUGHT:
             continue
         x = attached_point(fibres, p, positions)
-        begin, end = vec3(fibres.begin, p), vec3(fibres.end, p)
-        other = lerp(when, begin, end)
+        other = other_end(fibres, p, positions, when)
         bend = _bend_point(motion.pose, fibres.place[p, 0], fibres.place[p, 1])
-        bent = _bent(fibres, p, x, bend, other)
+        bent = bent_fibre(fibres, p, x, bend, other)
         if bent.length <= fibres.length[p]:
             continue
-        of_blade, of_end = displacement_of(motion, bend), sub(end, begin)
+        of_blade = displacement_of(motion, bend)
+        of_end = other_motion(fibres, p, velocities, dt)
         of_point = scale(dt, attached_point(fibres, p, velocities))
         stretching = dot(bent.to_point, sub(of_point, of_blade)) + dot(
             bent.to_end, sub(of_end, of_blade)
@@ -144,7 +112,10 @@ def add_caught_forces(
         spring = fibres.stiffness[p] * (bent.length - fibres.length[p])
         fibres.dissipated += share * (tension - spring) * stretching
         at_end = scale(tension, bent.to_end)
-        fibres.work += share * dot(at_end, of_end)
+        if fibres.is_tie[p] == 1:
+            pull_other_end(fibres, p, scale(-1.0, at_end), context.stages.external)
+        else:
+            fibres.work += share * dot(at_end, of_end)
         count_impulse(fibres, p, other, scale(seconds, at_end))
         spread_force(fibres, p, scale(-tension, bent.to_point), context.stages.external)
         pushed = scale(-tension, add(bent.to_point, bent.to_end))
@@ -169,7 +140,7 @@ def slip_fibres(fibres: Attachments, positions: FloatArray, edge: Edge, when: fl
         if fibres.state[p] != CAUGHT:
             continue
         x = attached_point(fibres, p, positions)
-        other = lerp(when, vec3(fibres.begin, p), vec3(fibres.end, p))
+        other = other_end(fibres, p, positions, when)
         if not _back_off(fibres, p, pose, x, other):
             free_fibre(fibres, p, x, other, _bend_of(fibres, p, pose))
             continue
@@ -215,7 +186,7 @@ def _pulls_forward(
     fibres: Attachments, p: int, pose: BladePose, behind: float, x: Vec3, end: Vec3
 ) -> float:
     """Return how far a fibre with its bend so far behind the edge would pull forward [1]."""
-    bent = _bent(fibres, p, x, _bend_point(pose, fibres.place[p, 0], behind), end)
+    bent = bent_fibre(fibres, p, x, _bend_point(pose, fibres.place[p, 0], behind), end)
     return dot(add(bent.to_point, bent.to_end), pose.forward)
 
 
@@ -229,7 +200,7 @@ def _energy_at(fibres: Attachments, p: int, bend: Vec3, x: Vec3, end: Vec3) -> f
 def _slip(fibres: Attachments, p: int, pose: BladePose, x: Vec3, end: Vec3) -> None:
     """Move the bend behind the edge until the edge bears it; spend the energy on cutting."""
     bend = _bend_of(fibres, p, pose)
-    cutting, most = fibres.toughness[p] * fibres.section[p], _resistance(fibres, p)
+    cutting, most = fibres.toughness[p] * fibres.section[p], cutting_resistance(fibres, p)
     force = force_at(fibres, p, bend, x, end)
     in_plane = axpy(-dot(force, pose.normal), pose.normal, force)
     size = norm(in_plane)
@@ -275,7 +246,7 @@ def force_at(fibres: Attachments, p: int, bend: Vec3, x: Vec3, end: Vec3) -> Vec
         x: Its point of the tissue [m].
         end: Its other end [m].
     """
-    bent = _bent(fibres, p, x, bend, end)
+    bent = bent_fibre(fibres, p, x, bend, end)
     tension = tension_of(fibres, p, max(bent.length, fibres.length[p]), 0.0)
     return scale(tension, add(bent.to_point, bent.to_end))
 
@@ -333,7 +304,8 @@ def free_fibres(fibres: Attachments, positions: FloatArray) -> None:
     """Release all fibres from the blade, which is taken away."""
     for p in range(len(fibres.nodes)):
         if fibres.state[p] == CAUGHT:
-            x, end = attached_point(fibres, p, positions), vec3(fibres.begin, p)
+            x = attached_point(fibres, p, positions)
+            end = other_end(fibres, p, positions, 0.0)
             free_fibre(fibres, p, x, end, vec3(fibres.bend, p))
         fibres.side[p] = 0.0
 
@@ -358,9 +330,12 @@ def write_stiffening(
         if fibres.state[p] == CAUGHT:
             x, bend = attached_point(fibres, p, positions), vec3(fibres.bend, p)
             near = norm(sub(x, bend))
-            length = near + norm(sub(vec3(fibres.end, p), bend)) + 2.0 * travel
+            far = norm(sub(end_after_step(fibres, p, positions), bend))
+            length = near + far + 2.0 * travel
+            if fibres.is_tie[p] == 1:  # either end is a point of the tissue
+                near = min(near, far)
             stretch = max(length - fibres.length[p], 0.0)
-            out[p] += stretch / max(near - travel, _radius(fibres, p))
+            out[p] += stretch / max(near - travel, end_zone(fibres, p))
         elif fibres.state[p] == SEVERED:
             out[p] = 0.0
 
@@ -374,12 +349,13 @@ def report_fibres(
     for p in range(len(fibres.nodes)):
         if fibres.state[p] != CAUGHT:
             continue
-        x, end = attached_point(fibres, p, positions), vec3(fibres.end, p)
+        x = attached_point(fibres, p, positions)
+        end = end_after_step(fibres, p, positions)
         bend = _bend_of(fibres, p, pose)
         force = force_at(fibres, p, bend, x, end)
-        bent = _bent(fibres, p, x, bend, end)
+        bent = bent_fibre(fibres, p, x, bend, end)
         along = norm(add(bent.to_point, bent.to_end))
         # A fibre that is being cut pulls no harder when the blade continues.
-        is_cut = norm(force) >= (1.0 - _ROUNDING) * _resistance(fibres, p)
+        is_cut = norm(force) >= (1.0 - _ROUNDING) * cutting_resistance(fibres, p)
         stiffness = 0.0 if is_cut else fibres.stiffness[p] * along * along
         report_fibre(report, pose, bend, scale(-1.0, force), stiffness)

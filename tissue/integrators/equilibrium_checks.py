@@ -100,7 +100,7 @@ def support_of(system: TissueModel, material: Material, floor: float | None) -> 
             material cannot carry its weight.
     """
     support = SupportConditions(floor, own_weight(system, material, floor))
-    if not (len(system.attachments.nodes) or system.geoms.geoms):
+    if not ((system.attachments.is_tie == 0).any() or system.geoms.geoms):
         _expect_held(system, floor)
         expect_bearable(support.weight)
     return support
@@ -321,5 +321,5 @@ def _farthest_from_support(system: TissueModel, floor: float | None) -> float:
 def _is_support(system: TissueModel) -> BoolArray:
     """Return which nodes are fixed or attached, shape (n_nodes,)."""
     found: BoolArray = system.body.fixed[: system.body.n_nodes].copy()
-    found[system.attachments.nodes] = True
+    found[system.attachments.nodes[system.attachments.is_tie == 0]] = True
     return found

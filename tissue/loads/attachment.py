@@ -85,6 +85,8 @@ class Attachment:
         if not breaks_at > 0.0:
             raise ValueError(f"breaks_at is {breaks_at} N; it must be positive")
         self.points = points
+        self.to: MaterialPoints | None = None
+        """Points of the tissue at the other ends, where it ties two bodies; None: a frame."""
         self.number = -1
         """Its number among all attachments of its tissue; -1 where it never held."""
         self.stiffness = float(stiffness)
@@ -134,8 +136,11 @@ class Attachment:
                 None: as they are.
 
         Raises:
-            ValueError: a number is not finite, or it is no rotation.
+            ValueError: a number is not finite, it is no rotation, or the other ends are in the
+                tissue.
         """
+        if self.to is not None:
+            raise ValueError("its other ends are points of the tissue, which move with that")
         axes = self._end[0] if rotation is None else checked_rotation(rotation, "rotation")
         self._end = (axes, _triple("origin", np.array(origin, dtype=np.float64)))
 
@@ -159,6 +164,8 @@ class Attachment:
         if self._seconds >= self._path.release_at:
             self.is_released = True
         self._seconds += dt
+        if self.to is not None:
+            return
         self.move(self._start + self._path.at(self._seconds))
 
     def forget(self) -> None:
@@ -227,7 +234,9 @@ class Ligament(Attachment):
     """Fibres from points of a tissue to other places: each pulls where it is taut.
 
     The edge of the blade bends the fibres that it sweeps across, and cuts them
-    (`tissue.forces.fibres`). The other ends are fixed to a frame: the world, until `move`.
+    (`tissue.forces.fibres`). The other ends are fixed to a frame, the world, until `move`; or they
+    are points of the tissue: then a fibre tears where it is stretched until its energy is what
+    cutting it costs.
 
     Args:
         points: The points of the tissue, each with its share of stiffness and cross-section.

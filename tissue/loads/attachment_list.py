@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tissue.core.array_types import FloatArray
 from tissue.forces.attachments import (
     CAUGHT,
     Attachments,
@@ -12,6 +13,7 @@ from tissue.forces.attachments import (
 from tissue.forces.fibre_crossing import catch_fibres, note_fibres
 from tissue.forces.fibres import free_fibres, write_stiffening
 from tissue.forces.step_context import Increment
+from tissue.forces.tearing import tear_fibres
 from tissue.loads.attachment import Attachment
 from tissue.mesh.body import Body
 
@@ -124,10 +126,12 @@ class AttachmentList:
         self._had_caught = has_caught
 
     def end_increment(self, body: Body, increment: Increment) -> None:
-        """Catch the fibres that the blade has met."""
+        """Catch the fibres that the blade has met, and tear those between bodies that must."""
         if self.has_fibres and self._edge_length > 0.0:
             _, _, begin, end = increment
             catch_fibres(self.arrays, body.positions, increment.edge, begin, end)
+        if self.has_fibres:
+            tear_fibres(self.arrays, body.positions)
 
     def locate(self, body: Body) -> None:
         """Find the points in the mesh, which a cut has changed."""
@@ -135,11 +139,12 @@ class AttachmentList:
         for each in self._attachments:
             nodes, weights = each.points.nodes_and_weights(body)
             rows = slice(row, row + len(nodes))
-            self.arrays.nodes[rows], self.arrays.weights[rows] = nodes, np.maximum(weights, 0.0)
+            self.arrays.nodes[rows], self.arrays.weights[rows] = nodes, _within(weights)
+            if each.to is not None:
+                others, of_others = each.to.nodes_and_weights(body)
+                self.arrays.other_nodes[rows] = others
+                self.arrays.other_weights[rows] = _within(of_others)
             row += len(nodes)
-        # A point in the middle of a cut tetrahedron may be outside of it by rounding.
-        if row:
-            self.arrays.weights /= self.arrays.weights.sum(axis=1, keepdims=True)
         self._bound(body, 0.0)
 
     def _bound(self, body: Body, travel: float) -> None:
@@ -197,7 +202,17 @@ class AttachmentList:
             self.arrays.length[rows] = each.lengths
             self.arrays.section[rows] = each.sections
             self.arrays.toughness[rows] = each.toughness
+            self.arrays.is_tie[rows] = each.to is not None
             row += n
         self.has_fibres = bool(self.arrays.section.any())
         self._write_targets()
         self.locate(body)
+
+
+def _within(weights: FloatArray) -> FloatArray:
+    """Return weights of points in their tetrahedra: in a cut one rounding may have put it outside.
+
+    `weights`: shape (n, 4).
+    """
+    inside = np.maximum(weights, 0.0)
+    return np.asarray(inside / inside.sum(axis=1, keepdims=True))

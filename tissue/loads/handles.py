@@ -12,7 +12,7 @@ from tissue.core.three_vectors import BladeSweep
 from tissue.forces.step_context import Increment
 from tissue.forces.terms import write_support_forces
 from tissue.integrators.model import TissueModel
-from tissue.loads.attachment import Attachment
+from tissue.loads.attachment import Attachment, Ligament, ends_of_fibres
 from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.load import Load, Loads
 from tissue.loads.material_points import MaterialPoints, points_to_hold, region_mask
@@ -74,6 +74,35 @@ class Handles:
         """
         self.expect_all_nodes_move("tissue is not attached")
         return points_to_hold(self._model.body, where)
+
+    def ligament(
+        self,
+        where: str | npt.ArrayLike | MaterialPoints,
+        to: npt.ArrayLike | MaterialPoints,
+        rest_length: float | None,
+        numbers: tuple[float, float, float, float, float],
+    ) -> Ligament:
+        """Return fibres that are to hold; see `tissue.Tissue.tie`.
+
+        Args:
+            where: Where they begin.
+            to: Where they end.
+            rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
+            numbers: Stiffness [N/m], cross-section [m2], toughness [J/m2], damping [N s/m], and the
+                force at which they release the tissue [N].
+
+        Raises:
+            ValueError: an end is not there, or a number has the wrong sign.
+        """
+        body, points = self._model.body, self.points_to_hold(where)
+        begin = points.positions(body)
+        if not isinstance(to, MaterialPoints):
+            return Ligament(points, *ends_of_fibres(begin, to, rest_length), *numbers)
+        inside = to.repeated(len(points))
+        ends = ends_of_fibres(begin, inside.positions(body), rest_length)
+        ligament = Ligament(points, *ends, *numbers)
+        ligament.to = inside
+        return ligament
 
     def attach(self, attachment: Held) -> Held:
         """Add an attachment, which holds from now on; return it."""

@@ -39,6 +39,21 @@ class MaterialPoints:
         locate_points(body, self.rest, self._tetrahedra, self._weights)
         return body.tetrahedra[self._tetrahedra], self._weights
 
+    def repeated(self, n: int) -> "MaterialPoints":
+        """Return these points; one point as often as that.
+
+        Raises:
+            ValueError: there are more than one, and not `n`.
+        """
+        if len(self) == n:
+            return self
+        if len(self) != 1:
+            raise ValueError(
+                f"there are {len(self)} other ends for {n} points; give one, or one for each"
+            )
+        rest, tetrahedra = np.repeat(self.rest, n, axis=0), np.repeat(self._tetrahedra, n)
+        return MaterialPoints(rest, tetrahedra, np.full(n, 1.0 / n))
+
     def positions(self, body: Body) -> FloatArray:
         """Return where the points are now [m], shape (n, 3)."""
         nodes, weights = self.nodes_and_weights(body)
@@ -60,7 +75,11 @@ def locate_points(body: Body, rest: FloatArray, tetrahedra: IntArray, weights: F
         p, held = vec3(rest, k), tetrahedra[k]
         if held < 0 or _depth(body, rest, k, held) < -INSIDE_TOLERANCE:
             deepest = -np.inf
+            # What a cut makes of a tetrahedron keeps its label, and bodies touch at rest.
+            label = body.materials.label[body.material[held]] if held >= 0 else -1
             for t in range(body.n_tetrahedra):
+                if label >= 0 and body.materials.label[body.material[t]] != label:
+                    continue
                 depth = _depth(body, rest, k, t)
                 if depth > deepest:
                     deepest, held = depth, t

@@ -21,6 +21,10 @@ EXAMPLE = PAGE.read_text("utf-8").partition("## Several bodies")[2]
 EXAMPLE = EXAMPLE.partition("```toml\n")[2].partition("```")[0]
 
 
+LAYER = PAGE.read_text("utf-8").partition("### Ties between bodies")[2]
+LAYER = LAYER.partition("```toml\n")[2].partition("```")[0]
+
+
 def written(folder: Path, text: str = EXAMPLE) -> Path:
     path = folder / "scene.toml"
     path.write_text(text, "utf-8")
@@ -112,6 +116,31 @@ def test_attachments_and_cores_are_of_one_body(tmp_path):
     )
     tissue = make_tissue(read_scene(written(tmp_path, text)))
     assert [each.n_points for each in tissue.attachments] == [11 * 9, 10 * 8]
+
+
+def test_a_body_hangs_from_another_by_the_layer_of_the_page(tmp_path):
+    tissue = make_tissue(read_scene(written(tmp_path, LAYER)))
+    (tie,) = tissue.attachments
+    assert tie.n_points == 2 * 6 * 5 and tie.sections.sum() == pytest.approx(0.03 * 0.025)
+    tissue.step(None, 1e-3)
+    weight = 9.81 * tissue.pieces()[1].mass
+    np.testing.assert_allclose(tie.wrench.force, [0.0, 0.0, -weight], atol=0.01 * weight)
+
+
+def test_a_tie_names_two_bodies(tmp_path):
+    for old, new, message in (
+        ('body = "lump"\n', "", "has to_body and no other body"),
+        ("toughness = 4.0", "", "has to_body and no toughness"),
+        ('to_body = "bed"', 'to_body = "bd"', "Did you mean 'bed'"),
+        ('to_body = "bed"', 'to_body = "bed"\nto = [0, 0, 0]', "has to_body and to;"),
+    ):
+        text = LAYER.replace(old, new)
+        assert text != LAYER
+        with pytest.raises(UsageError, match=message):
+            read_scene(written(tmp_path, text))
+    far = LAYER.replace('to_body = "bed"', 'to_body = "bed"\nwithin = 1e-4')
+    with pytest.raises(UsageError, match=r"\[\[attachment\]\] number 1: no skin of the one body"):
+        make_tissue(read_scene(written(tmp_path, far)))
 
 
 WRONG = {
