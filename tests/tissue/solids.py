@@ -11,15 +11,10 @@ from tissue import BoolArray, FloatArray, TetrahedralMesh
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
 from tissue.elasticity.energy import solid_energy
-from tissue.elasticity.finite_elements import (
-    Solid,
-    averages_shear,
-    build_tetrahedra,
-    n_blocks,
-    no_solid,
-)
+from tissue.elasticity.finite_elements import Solid, averages_shear, n_blocks, no_solid
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import deform_solid, solid_force, solid_forces
+from tissue.elasticity.rest_shapes import build_tetrahedra
 from tissue.elasticity.stars import build_stars, room_for_stars
 from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks, relax_nodes
 from tissue.elasticity.viscous_stress import Viscosity, no_viscosity, viscous_corner_forces

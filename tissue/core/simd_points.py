@@ -150,6 +150,12 @@ def row_of_lane(lane: int, width: int) -> int:
     return lane % 4 * (width // 4) + lane // 4
 
 
+@kernel
+def lane_of_row(row: int, width: int) -> int:
+    """Return the lane that is written into a row: the inverse of `row_of_lane`."""
+    return row % (width // 4) * 4 + row // (width // 4)
+
+
 def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
     """Write the points of a vector into as many rows, lane k into row `i + row_of_lane(k)`.
 

@@ -5,7 +5,8 @@ In the order in which they are best read:
     elasticity              owner of the arrays; follows the cuts
     internal_forces         the force on a node: springs, tetrahedra, or both
     springs                 masses, springs along the edges, and their forces
-    finite_elements         tetrahedra as elements: rest shapes, and the star of each node
+    finite_elements         tetrahedra as elements: what is kept of each, and of each node
+    rest_shapes             their shapes at rest
     neo_hookean             forces of tetrahedra; what laws differ in is in `tissue.laws.kernels`
     collapse                what keeps tetrahedra from turning inside out where springs alone act
     viscous_stress          how tetrahedra resist their rate of deformation

@@ -153,13 +153,11 @@ def _write_stresses(solid: Solid, first: int, has_stiffened: bool, has_relaxed: 
         s = splat(0.0, q)
         factor = stiffening_factor(of_block, q)
         stiffness, _ = shear_stiffness(of_block, q, factor, gradient, cofactors)
-        stiffness = where_averaged(solid, first, stiffness)
         store_block(solid.node_stiffness, first, stiffness)
         rest = share * modulus * (factor - taken)
     else:
         s = share * isotropic_factor(of_block, x.x + y.y + z.z, x, y, z)
         rest = share * modulus * (splat(1.0, q) - taken)
-    stiffness_taken = where_averaged(solid, first, stiffness_taken)
     store_block(solid.stiffness_taken, first, stiffness_taken)
     px, py, pz = stress_of(rest + s, splat(-1.0, s) * rest, s, gradient, cofactors)
     if has_relaxed:
@@ -169,15 +167,6 @@ def _write_stresses(solid: Solid, first: int, has_stiffened: bool, has_relaxed: 
     taken = share * modulus * taken
     columns = (px.x, px.y, px.z, py.x, py.y, py.z, pz.x, pz.y, pz.z, pressure, taken)
     store_columns(solid.node_stress, first, columns)
-
-
-@inlined
-def where_averaged(solid: Solid, first: int, values: Lanes) -> Lanes:
-    """Return the values of a vector of nodes, 0 where nothing is averaged around a node."""
-    if not is_graded(solid):
-        return values
-    mixed = gathered_like(values, solid.node_is_mixed, solid.every, first)
-    return values * (splat(1.0, values) - mixed)
 
 
 @inlined
@@ -212,7 +201,8 @@ def stress_of_nodes(solid: Solid, block: int, v: Lanes) -> tuple[MatrixRows, Lan
         v: Their volumes [m3].
     """
     first = 4 * width_of(solid.shape) * block
-    sums = sums_of_four_rows(solid.node_stress, solid.nodes, first)
+    sites = solid.sites if is_graded(solid) else solid.nodes
+    sums = sums_of_four_rows(solid.node_stress, sites, first)
     xx, xy, xz, yx, yy, yz, zx, zy, zz, pressure, taken = sums
     quarter = splat(0.25, v)
     mean = (
@@ -233,12 +223,12 @@ def mean_of_nodes(values: FloatArray, solid: Solid, block: int, like: Lanes) -> 
         block: A block of them.
         like: A vector of the type of the means.
     """
-    nodes, width = solid.nodes, width_of(solid.shape)
+    sites, width = solid.sites if is_graded(solid) else solid.nodes, width_of(solid.shape)
     first = 4 * width * block
-    ends = gathered_like(like, values, nodes, first)
-    ends = ends + gathered_like(like, values, nodes, first + width)
-    others = gathered_like(like, values, nodes, first + 2 * width)
-    others = others + gathered_like(like, values, nodes, first + 3 * width)
+    ends = gathered_like(like, values, sites, first)
+    ends = ends + gathered_like(like, values, sites, first + width)
+    others = gathered_like(like, values, sites, first + 2 * width)
+    others = others + gathered_like(like, values, sites, first + 3 * width)
     return splat(0.25, like) * (ends + others)
 
 

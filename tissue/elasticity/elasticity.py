@@ -7,13 +7,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import SameTypes
 from tissue.elasticity.collapse import no_collapse, renew_collapsing
-from tissue.elasticity.finite_elements import (
-    averages_shear,
-    build_tetrahedra,
-    grown_solid,
-    is_graded,
-    no_solid,
-)
+from tissue.elasticity.finite_elements import averages_shear, grown_solid, is_graded, no_solid
 from tissue.elasticity.frequency.changes import (
     forget_added_mass,
     return_all_mass,
@@ -29,6 +23,7 @@ from tissue.elasticity.mass_scaling import (
     write_masses,
 )
 from tissue.elasticity.relaxed_stress import inherit_at_nodes, inherit_relaxed
+from tissue.elasticity.rest_shapes import build_tetrahedra
 from tissue.elasticity.springs import build_rows, no_springs
 from tissue.elasticity.stars import build_stars, room_for_stars
 from tissue.elasticity.viscous_stress import grown_viscosity, no_viscosity

@@ -21,9 +21,7 @@ from tissue.core.simd_blocks import width_of
 from tissue.core.simd_points import row_of_lane
 from tissue.core.sized import sized
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
 from tissue.laws.energy_density import EnergyDensity
-from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR
 
 N_RELAXED = 7
@@ -67,9 +65,13 @@ class Solid(Arrays, two_precisions=True):
     moduli: FloatArray = sized((N_MODULI, "graded"), fill=1.0, is_for_vectors=True)
     """Moduli and other numbers of the law of each tetrahedron, in blocks of nine rows
     (`tissue.elasticity.graded`); empty where the whole body has the same."""
-    node_is_mixed: FloatArray = sized("graded_nodes")
-    """1 where labels meet, and nothing is averaged around the node; else 0. Shape (nodes,), as of
-    the moduli of nodes that follow, which are 0 there; empty where `moduli` is."""
+    node_label: IntArray = sized("graded_nodes")
+    """Label whose tetrahedra are averaged around each node, shape (nodes,), as of the moduli of
+    nodes that follow; empty where `moduli` is."""
+    sites: SlotArray = sized((4, "graded"), is_for_vectors=True)
+    """Where what is averaged at each corner of each tetrahedron is: its node, or where another
+    label is averaged there the last row, which is 0. In blocks as `nodes`; empty where `moduli`
+    is."""
     node_modulus: FloatArray = sized("graded_nodes")
     """`EnergyDensity.lam_of_nodes` of each node [Pa]."""
     node_shear: FloatArray = sized("graded_nodes")
@@ -124,11 +126,13 @@ class Solid(Arrays, two_precisions=True):
     """Tetrahedra around each node, shape (nodes,). Its row is padded to a multiple of eight slots
     with places that always hold 0."""
     around: SlotArray = sized("pool")
-    """Place in `dilated` of the tetrahedron of each slot, in order of tetrahedra; shape (pool,)."""
+    """Place in `dilated` of the tetrahedron of each slot, in order of tetrahedra; one that always
+    holds 0 where it is not averaged around the node. Shape (pool,)."""
     corner: SlotArray = sized("pool")
     """Row of `forces` with the force on the corner of each slot, shape (pool,)."""
     node_volume: FloatArray = sized("padded_nodes")
-    """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
+    """A quarter of each tetrahedron that is averaged around the node, at rest [m3], shape
+    (nodes,)."""
     weight: FloatArray = sized("nodes")
     """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency.at_rest`), shape
     (nodes,)."""
@@ -217,7 +221,7 @@ class Solid(Arrays, two_precisions=True):
     """1 where no tetrahedron has changed since `strained_frequency` was run for the next step."""
     fastest: IntCell
     """Tetrahedron that set the number of steps in the last test, or -1 where none did."""
-    pressure: FloatArray = sized("nodes", 4, is_for_vectors=True)
+    pressure: FloatArray = sized("padded_nodes", 4, is_for_vectors=True)
     """Scratch: lam (J - 1) of each node [Pa], tension is positive, four times in a row
     (`values_of_rows`); shape (nodes, 4)."""
     forces: FloatArray = sized((16, "behind_a_block"), 4, is_for_vectors=True)
@@ -308,7 +312,14 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
         solid.law, n_nodes, n_tetrahedra, pool, n_terms, is_single, bool(is_graded(solid))
     )
     larger = solid.grown(sizes)
+    larger.sites[larger.sites == nothing_averaged(solid)] = nothing_averaged(larger)
     return larger.replaced(every=np.arange(max(n_nodes, n_tetrahedra) + 2 * WIDTH))
+
+
+@inlined
+def nothing_averaged(solid: Solid) -> int:
+    """Return the row of nodes that has no averages: the last one, behind those of any vector."""
+    return len(solid.node_volume) - 1
 
 
 @kernel
@@ -345,55 +356,10 @@ def corner_row(solid: Solid, t: int, k: int) -> int:
 @inlined
 def is_graded(solid: Solid) -> bool:
     """Return whether tetrahedra have moduli of their own."""
-    return len(solid.node_is_mixed) > 0
+    return len(solid.node_label) > 0
 
 
 @inlined
 def averages_shear(solid: Solid) -> bool:
     """Return whether a share of the shear acts on gradients averaged around nodes."""
     return solid.law.shear_of_nodes != 0.0
-
-
-@kernel
-def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> None:
-    """Write the rest shapes of the first `n` of `tetrahedra`."""
-    for i in range(n):
-        t = tetrahedra[i]
-        for k in range(4):
-            solid.nodes[node_place(solid, t, k)] = body.tetrahedra[t, k]
-        n1, n2, n3, volume = rest_normals(body, t)
-        per = 1.0 / (6.0 * volume)
-        _store_gradient(solid, t, 0, scale(per, n1))
-        _store_gradient(solid, t, 3, scale(per, n2))
-        _store_gradient(solid, t, 6, scale(per, n3))
-        solid.shape[shape_place(solid, t, VOLUME)] = volume
-
-
-@kernel
-def _store_gradient(solid: Solid, t: int, first: int, gradient: Vec3) -> None:
-    solid.shape[shape_place(solid, t, first)] = gradient.x
-    solid.shape[shape_place(solid, t, first + 1)] = gradient.y
-    solid.shape[shape_place(solid, t, first + 2)] = gradient.z
-
-
-@kernel
-def rest_normals(body: Body, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
-    """Return 6 V grad N of nodes 1, 2 and 3 of a tetrahedron at rest [m2], and V [m3]."""
-    return normals(body, body.rest, t)
-
-
-@kernel
-def normals(body: Body, points: FloatArray, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
-    """Return twice the area vectors of the faces opposite nodes 1, 2 and 3, and the volume.
-
-    Args:
-        body: For the nodes of the tetrahedron.
-        points: Where the nodes are [m].
-        t: The tetrahedron.
-    """
-    x0 = vec3(points, body.tetrahedra[t, 0])
-    d1 = sub(vec3(points, body.tetrahedra[t, 1]), x0)
-    d2 = sub(vec3(points, body.tetrahedra[t, 2]), x0)
-    d3 = sub(vec3(points, body.tetrahedra[t, 3]), x0)
-    n1 = cross(d2, d3)
-    return n1, cross(d3, d1), cross(d1, d2), dot(d1, n1) / 6.0

@@ -2,14 +2,17 @@
 
 Each tetrahedron has the constants of its own law. A part of the volume term acts on volumes that
 are averaged around nodes, which have one modulus each: the mean over the tetrahedra there, by
-volume. Where labels meet, volumes are not averaged, and each tetrahedron keeps its own share:
+volume. Where labels meet, only the tetrahedra of one of them are averaged, that which bears most
+there: Young's modulus times volume. Each of the others keeps its own share of the node,
 
     V_n K_n / 2 (J_n - 1)^2     becomes     sum of V_t / 4 K_t / 2 (J_t - 1)^2
 
 So it is with shear, where a share of it is averaged (`tissue.elasticity.averaged_shear`). Strain
 jumps at a border, and pressure may: so the energy is exact where the strain of each part is even,
-in layers in series as in parallel. An average across the border would be right in one of the two. A
-cut along a border makes its nodes those of one label, and they average again.
+in layers in series as in parallel. An average across the border would be right in one of the two.
+Tetrahedra that average nothing are stiffer, and the step shorter: in the organ with ten labels of
+one modulus 0.67 to 0.70 of that of one label without any average at borders, 0.79 to 0.86 so. With
+an average of its own for each label around a node it would be 0.92.
 
 Viscosity, which has no law of its own, is divided in the same way.
 """
@@ -37,9 +40,11 @@ from tissue.elasticity.finite_elements import (
     averages_shear,
     is_graded,
     node_place,
+    nothing_averaged,
     shape_place,
 )
-from tissue.elasticity.stars import tetrahedron_of_slot
+from tissue.elasticity.stars import is_averaged, tetrahedron_of_slot
+from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.laws.kernels import LawOfBlock, same_law, stiffens
 from tissue.mesh.body import Body
 
@@ -215,29 +220,63 @@ def write_moduli(solid: Solid, body: Body, nodes: IntArray, n: int) -> None:
 @kernel
 def _write_node(solid: Solid, body: Body, node: int) -> None:
     """Write the moduli of the averages of a node: the mean over its tetrahedra, by volume."""
-    materials, begin = body.materials, solid.first[node]
+    begin, width = solid.first[node], width_of(solid.shape)
     end = begin + solid.count[node]
     if begin == end:
         return
-    first = body.material[tetrahedron_of_slot(solid, begin)]
-    is_mixed, is_even = False, True
+    chosen = _leading_slot(solid, body, begin, end)
+    first = body.material[tetrahedron_of_slot(solid, chosen)]
+    label, total, is_even = body.materials.label[first], 0.0, True
     for slot in range(begin, end):
-        row = body.material[tetrahedron_of_slot(solid, slot)]
-        is_mixed = is_mixed or materials.label[row] != materials.label[first]
-        is_even = is_even and row == first
-    solid.node_is_mixed[node] = 1.0 if is_mixed else 0.0
+        t = tetrahedron_of_slot(solid, slot)
+        solid.around[slot] = 0
+        if body.materials.label[body.material[t]] == label:
+            solid.around[slot] = width + t
+            total += 0.25 * tetrahedron_volume(body.rest, body.tetrahedra, t)
+            is_even = is_even and body.material[t] == first
+    solid.node_label[node], solid.node_volume[node] = label, total
     if averages_shear(solid):
         _write_series(solid, body, solid.node_series, node, first)
     _clear_node(solid, node)
-    if is_mixed:
-        solid.node_exponent[node] = materials.exponent[first]  # of no modulus
-    elif is_even:  # without rounding
+    if is_even:  # without rounding
         _add_to_node(solid, body, node, first, 1.0)
-    else:
-        for slot in range(begin, end):
+        return
+    for slot in range(begin, end):
+        if is_averaged(solid, slot):
             t = tetrahedron_of_slot(solid, slot)
             volume = 0.25 * solid.shape[shape_place(solid, t, VOLUME)]
-            _add_to_node(solid, body, node, body.material[t], volume / solid.node_volume[node])
+            _add_to_node(solid, body, node, body.material[t], volume / total)
+
+
+@kernel
+def _leading_slot(solid: Solid, body: Body, begin: int, end: int) -> int:
+    """Return a slot of the label that is averaged around a node: that which bears most there.
+
+    Args:
+        solid: The rows.
+        body: The materials.
+        begin: First slot of the row of the node.
+        end: End of it.
+    """
+    materials, leading, most = body.materials, begin, -1.0
+    for one in range(begin, end):
+        row, borne = body.material[tetrahedron_of_slot(solid, one)], 0.0
+        label, is_first = materials.label[row], True
+        for slot in range(begin, end):
+            t = tetrahedron_of_slot(solid, slot)
+            if materials.label[body.material[t]] == label:
+                is_first = is_first and slot >= one
+                modulus = materials.young_modulus[body.material[t]]
+                borne += modulus * solid.shape[shape_place(solid, t, VOLUME)]
+            if not is_first:
+                break
+        is_lower = (
+            borne == most
+            and label < materials.label[body.material[tetrahedron_of_slot(solid, leading)]]
+        )
+        if is_first and (borne > most or is_lower):
+            leading, most = one, borne
+    return leading
 
 
 @kernel
@@ -305,7 +344,10 @@ def _write_tetrahedron(solid: Solid, body: Body, t: int) -> None:
     row, materials, share = body.material[t], body.materials, solid.law.shear_of_nodes
     mixed = 0.0
     for k in range(4):
-        mixed += 0.25 * solid.node_is_mixed[solid.nodes[node_place(solid, t, k)]]
+        node = solid.nodes[node_place(solid, t, k)]
+        is_own = solid.node_label[node] == materials.label[row]
+        solid.sites[node_place(solid, t, k)] = node if is_own else nothing_averaged(solid)
+        mixed += 0.0 if is_own else 0.25
     of_averages, own = materials.lam_of_nodes[row], materials.lam_of_tetrahedra[row]
     viscous = _viscous_moduli(solid, body, row)
     modulus = max(own + of_averages, NO_MODULUS)

@@ -314,12 +314,12 @@ def _dilated(v: Lanes, x: Vec3, y: Vec3, z: Vec3, cofactors: MatrixRows) -> Lane
 
 @inlined
 def sum_of_corners(solid: Solid, rows: FloatArray, block: int) -> Lanes:
-    """Return the sum of what `rows` have for the four nodes of the tetrahedra of a block."""
-    width, nodes = width_of(solid.shape), solid.nodes
+    """Return the sum of what `rows` have averaged at the corners of the tetrahedra of a block."""
+    width, sites = width_of(solid.shape), solid.sites if is_graded(solid) else solid.nodes
     first = 4 * width * block
-    ends = values_of_rows(rows, nodes, first) + values_of_rows(rows, nodes, first + width)
-    others = values_of_rows(rows, nodes, first + 2 * width)
-    return ends + (others + values_of_rows(rows, nodes, first + 3 * width))
+    ends = values_of_rows(rows, sites, first) + values_of_rows(rows, sites, first + width)
+    others = values_of_rows(rows, sites, first + 2 * width)
+    return ends + (others + values_of_rows(rows, sites, first + 3 * width))
 
 
 @inlined

@@ -22,7 +22,7 @@ from tissue.core.simd_blocks import gathered_like, load_block, splat, width_of
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import N_RELAXED, VOLUME, Solid, is_graded, shape_place
 from tissue.elasticity.graded import own_share_of_one
-from tissue.elasticity.stars import tetrahedron_of_slot
+from tissue.elasticity.stars import is_averaged, tetrahedron_of_slot
 
 PRESSURE = 6
 """Place of r among the numbers of a tetrahedron. Before it are xx, yy, zz, yz, xz and xy of R."""
@@ -170,6 +170,8 @@ def inherit_at_nodes(solid: Solid, nodes: IntArray, n: int) -> None:
             for term in range(n_terms):
                 value = 0.0
                 for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+                    if not is_averaged(solid, slot):
+                        continue
                     t = tetrahedron_of_slot(solid, slot)
                     volume = 0.25 * solid.shape[shape_place(solid, t, VOLUME)]
                     if is_graded(solid):
@@ -177,8 +179,6 @@ def inherit_at_nodes(solid: Solid, nodes: IntArray, n: int) -> None:
                         volume *= (1.0 - solid.law.shear_of_nodes) / own
                     value += volume * solid.relaxed_terms[relaxed_term_place(solid, t, term, which)]
                 value *= share / solid.node_volume[node]
-                if is_graded(solid) and solid.node_is_mixed[node] == 1.0:
-                    value = 0.0
                 solid.node_relaxed_terms[relaxed_term_place(solid, node, term, which)] = value
                 total += value
             solid.node_relaxed[relaxed_place(solid, node, which)] = total

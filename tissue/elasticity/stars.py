@@ -4,6 +4,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, filled
 from tissue.core.simd_blocks import width_of
+from tissue.core.simd_points import lane_of_row
 from tissue.elasticity.finite_elements import Solid, corner_row
 from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
@@ -66,9 +67,17 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
 
 @kernel
 def tetrahedron_of_slot(solid: Solid, slot: int) -> int:
-    """Return the tetrahedron of a slot of a row."""
-    t: int = solid.around[slot] - width_of(solid.shape)
+    """Return the tetrahedron of a slot of a row, whether it is averaged there or not."""
+    width, row = width_of(solid.shape), solid.corner[slot]
+    block = row // (4 * width) - 1
+    t: int = width * block + lane_of_row(row % width, width)
     return t
+
+
+@kernel
+def is_averaged(solid: Solid, slot: int) -> bool:
+    """Return whether the tetrahedron of a slot of a row is averaged around the node."""
+    return solid.around[slot] > 0  # type: ignore[no-any-return]
 
 
 @kernel

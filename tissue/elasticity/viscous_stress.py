@@ -115,13 +115,14 @@ def _sizes(solid: Solid, is_viscous: bool) -> dict[str, int]:
     n_nodes, width = len(solid.first) * is_viscous, width_of(solid.shape)
     in_blocks = len(solid.shape) // N_SHAPE * is_viscous
     behind, averages = in_blocks + width * is_viscous, bool(averages_shear(solid))
+    rows = len(solid.node_volume) * is_viscous
     return {
         "nodes": n_nodes,
         "in_blocks": in_blocks,
         "averaged_behind_a_block": behind * averages,
-        "averaging_nodes": n_nodes * averages,
+        "averaging_nodes": rows * averages,
         "behind_a_block": behind * (not averages),
-        "dilating_nodes": n_nodes * (not averages),
+        "dilating_nodes": rows * (not averages),
         "forced_nodes": n_nodes,
     }
 
@@ -365,7 +366,8 @@ def _viscous_forces_of(viscosity: Viscosity, solid: Solid, block: int, is_averag
     p = lam * (along.x + along.y + along.z)
     along, across = scale(twice, along), scale(twice, across)
     if is_averaged:
-        sums = sums_of_four_rows(viscosity.node_rates, solid.nodes, 4 * width * block)
+        sites = solid.sites if is_graded(solid) else solid.nodes
+        sums = sums_of_four_rows(viscosity.node_rates, sites, 4 * width * block)
         xx, yy, zz, xy, yz, zx, trace, _, _, _, _ = sums
         if not is_graded(solid):
             trace = xx + yy + zz

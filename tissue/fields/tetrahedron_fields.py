@@ -20,8 +20,9 @@ in it, nor is what keeps tetrahedra of springs from turning inside out.
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, norm, sub, vec3
-from tissue.elasticity.finite_elements import corner_row, rest_normals
+from tissue.elasticity.finite_elements import corner_row
 from tissue.elasticity.internal_forces import Elastic, deform
+from tissue.elasticity.rest_shapes import rest_normals
 from tissue.elasticity.springs import NO_LENGTH
 from tissue.geometry.tetrahedron import Symmetric, tetrahedron_volume
 from tissue.mesh.body import Body

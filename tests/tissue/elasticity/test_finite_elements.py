@@ -9,14 +9,9 @@ from tests.tissue.kernels_of import cut_of, springs_of
 from tests.tissue.solids import LAWS, built, law_of, moved, solid_of
 from tissue import block
 from tissue.core.simd import WIDTH
-from tissue.elasticity.finite_elements import (
-    VOLUME,
-    build_tetrahedra,
-    grown_solid,
-    no_solid,
-    shape_place,
-)
+from tissue.elasticity.finite_elements import VOLUME, grown_solid, no_solid, shape_place
 from tissue.elasticity.frequency.at_rest import bound_solid_frequencies
+from tissue.elasticity.rest_shapes import build_tetrahedra
 from tissue.elasticity.stars import (
     STAR_POOL_MARGIN,
     build_stars,

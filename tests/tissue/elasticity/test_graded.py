@@ -137,3 +137,25 @@ def test_a_material_that_varies_within_a_label_is_averaged_like_one():
     tissue.set_material(np.arange(len(mesh.tetrahedra)) % 2 == 0, retardation_time=0.5)
     assert len(solid_of(tissue).solid.moduli) > 0
     np.testing.assert_allclose(solid_of(tissue).forces(x), alone, rtol=0.0, atol=1e-14)
+
+
+def test_around_each_node_the_label_that_bears_most_is_averaged_after_cuts():
+    mesh = bodies.jittered(3, 1, SIZE)
+    labels = np.random.default_rng(1).integers(0, 3, len(mesh.tetrahedra))
+    moduli = 10e3 * np.array([1.0, 2.0, 3.0])
+    materials = {label: Material(young_modulus=modulus) for label, modulus in enumerate(moduli)}
+    tissue = Tissue(mesh._replace(labels=labels), materials)
+    tissue.incise([[(0.012, y, -0.01), (0.028, y, 0.05)] for y in (-0.01, 0.05)], (0.0, 1.0, 0.0))
+    body, of_each, n = tissue.snapshot(), tissue.labels(), tissue.n_nodes
+    corners = body.rest_positions[body.tetrahedra]
+    quarter = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 24.0
+    volume = np.zeros((n, 3))
+    np.add.at(volume, (body.tetrahedra, of_each[:, None]), quarter[:, None])
+    leading = (volume * moduli).argmax(axis=1)
+    solid = solid_of(tissue).solid
+    np.testing.assert_array_equal(solid.node_label[:n], leading)
+    np.testing.assert_allclose(solid.node_volume[:n], volume[np.arange(n), leading], rtol=1e-12)
+    blocks = solid.sites.reshape(-1, 4, 8).transpose(0, 2, 1).reshape(-1, 4)[: len(of_each)]
+    is_own = leading[body.tetrahedra] == of_each[:, None]
+    np.testing.assert_array_equal(blocks < n, is_own)
+    np.testing.assert_array_equal(blocks[is_own], body.tetrahedra[is_own])

@@ -22,17 +22,12 @@ from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
+from tissue.core.simd_blocks import width_of
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
-from tissue.elasticity.finite_elements import (
-    Solid,
-    averages_shear,
-    is_graded,
-    node_place,
-    normals,
-    rest_normals,
-)
+from tissue.elasticity.finite_elements import Solid, averages_shear, is_graded, node_place
 from tissue.elasticity.graded import modulus_of_node, own_moduli, shear_of_node
-from tissue.elasticity.stars import corner_of_slot, tetrahedron_of_slot
+from tissue.elasticity.rest_shapes import normals, rest_normals
+from tissue.elasticity.stars import corner_of_slot, is_averaged, tetrahedron_of_slot
 from tissue.geometry.tetrahedron import add_square, largest_eigenvalue, nothing_symmetric
 from tissue.laws.kernels import stiffens
 from tissue.mesh.body import Body
@@ -176,6 +171,8 @@ def dilatation_term(
     visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+        if not is_averaged(solid, slot):
+            continue
         t = tetrahedron_of_slot(solid, slot)
         n1, n2, n3, _ = normals(body, points, t)
         n0 = scale(-1.0, add(n1, add(n2, n3)))
@@ -255,7 +252,7 @@ def bounds_of_node(
     weight = solid.weight[node]
     if weight == 0.0:
         return NodeBounds(0.0, 0.0)
-    law = solid.law
+    law, mass = solid.law, body.masses[node]
     # The part of lam of each tetrahedron by itself, at small strain. Where it is negative it is
     # limited: the bound still holds.
     own_share = 1.0 - law.shear_of_nodes
@@ -290,7 +287,7 @@ def bounds_of_node(
             if averages_shear(solid):
                 isotropic += _share_taken(solid, t) * share * length
         if has_stiffened:
-            place = solid.around[slot]
+            place = width_of(solid.shape) + t
             isotropic += float(solid.stiffening[place]) * mu * share * length
             slope = 2.0 * float(solid.stiffening_slope[place]) * mu * share / length
             along = sub(_stretched(body, points, t, at_rest), normal)
@@ -301,8 +298,8 @@ def bounds_of_node(
         stiffness = add_square(stiffness, c, normal)
         if averaged:
             for other in range(4):
-                n = _add_to_ring(solid, visits, n, t, other, normal, at_rest)
-    mass = body.masses[node]
+                if not is_graded(solid) or solid.sites[node_place(solid, t, other)] < body.n_nodes:
+                    n = _add_to_ring(solid, visits, n, t, other, normal, at_rest)
     if averages_shear(solid):
         isotropic += _averaged_shear(solid, n, has_stiffened) / weight
     for i in range(n):
@@ -317,10 +314,10 @@ def bounds_of_node(
 @inlined
 def _share_taken(solid: Solid, t: int) -> float:
     """Return the stiffness of averaged shear that a tetrahedron takes back [Pa]."""
-    total = 0.0
+    total, sites = 0.0, solid.sites if is_graded(solid) else solid.nodes
     for k in range(4):
-        node = solid.nodes[node_place(solid, t, k)]
-        total += float(solid.stiffness_taken[node]) * _relative_shear(solid, node)
+        site = sites[node_place(solid, t, k)]
+        total += float(solid.stiffness_taken[site]) * _relative_shear(solid, site)
     return solid.law.shear_modulus * (0.25 * total * solid.law.shear_of_nodes)
 
 

@@ -258,8 +258,9 @@ def bound_tetrahedra(elastic: Elastic, body: Body, nodes: IntArray, n: int) -> N
                 own = elastic.frequency_squared[corner] + elastic.of_contact[corner]
                 highest = max(highest, own)
                 shear = max(shear, solid.shear_frequency_squared[corner])
-            solid.inverse_bound[solid.around[slot]] = 1.0 / highest
-            solid.shear_share[solid.around[slot]] = shear / highest
+            place = width_of(solid.shape) + t
+            solid.inverse_bound[place] = 1.0 / highest
+            solid.shear_share[place] = shear / highest
 
 
 @kernel
@@ -269,7 +270,7 @@ def forget_tests(solid: Solid, nodes: IntArray, n: int) -> None:
     for i in range(n):
         node = nodes[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            place = solid.around[slot]
+            place = width_of(solid.shape) + tetrahedron_of_slot(solid, slot)
             solid.tested_growth[place] = solid.tested_stiffness[place] = 1.0
             solid.tested_bound[place] = 0.0
 
