@@ -22,7 +22,7 @@ from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.geometry.tetrahedron import barycentric_in, node_altitude
-from tissue.mesh.body import CUT, INSIDE_TOLERANCE, LONGEST_WALK, Body, walk
+from tissue.mesh.body import CUT, INSIDE_TOLERANCE, LONGEST_WALK, OUTER, Body, walk
 from tissue.mesh.interfaces import NO_LAYER, is_beside, layer_between
 
 FARTHEST_LAYER = 3.0
@@ -30,8 +30,7 @@ FARTHEST_LAYER = 3.0
 
 FOLLOWED_FROM, FOLLOWED_TO = 0.5, 1.0
 """Distance from which a cut follows a layer, and up to which one stays that follows it, here or at
-the next sample; per altitude of the element that lies on it, or per mean node size where that is
-more."""
+the next sample; per mean edge of the element's face on it, or mean node size where that is more."""
 
 LEAST_COSINE_FOLLOWED = 0.8
 """Cosine of the angle between a layer and the blade, at least: 37 degrees. A path turns aside by
@@ -51,24 +50,30 @@ AHEAD = 0.25
 size."""
 
 
+_AT_SKIN = -2
+"""In place of a row of `Interfaces`: the skin is beside the sample, and hides what is behind."""
+
+
 class LayerAhead(NamedTuple):
     """The layer beside a sample of the edge."""
 
     row: int
-    """Row of `Interfaces`, or NO_LAYER."""
+    """Row of `Interfaces`, or NO_LAYER or _AT_SKIN."""
     aside: float
     """Distance along the normal of the blade, negative on its other side [m]."""
     cosine: float
     """Cosine of the angle between the layer and the blade."""
     altitude: float
-    """Altitude of the element between the two over the layer [m]."""
+    """Altitude over the layer of the element between the two [m]."""
+    edge: float
+    """Mean edge of its face on the layer [m]."""
 
 
 class FaceOfLayer(NamedTuple):
     """A face of a layer, on a straight line."""
 
     row: int
-    """Row of `Interfaces`, or NO_LAYER where there is none."""
+    """Row of `Interfaces`; NO_LAYER where there is none, _AT_SKIN where the skin is near."""
     tetrahedron: int
     """Tetrahedron that the line leaves there."""
     face: int
@@ -101,7 +106,9 @@ def follow_layers(blade: BladeState, body: Body, path: Path) -> None:
             continue
         found = _layer_beside(blade, body, path, k, _follows(anchors, k))
         anchors.layer[k], anchors.layer_cosine[k] = found.row, found.cosine
-        if found.row != NO_LAYER:
+        if found.row == _AT_SKIN:
+            anchors.layer[k], anchors.layer_cosine[k] = NO_LAYER, 0.0
+        elif found.row != NO_LAYER:
             beside = min(abs(found.aside), KEPT_BESIDE * found.altitude)
             side = 1.0 if found.aside >= 0.0 else -1.0
             drift = sub(vec3(path.t1, k), vec3(anchors.rest, k))
@@ -130,14 +137,21 @@ def _follows(anchors: Anchors, k: int) -> bool:
 
 @kernel
 def _carry(anchors: Anchors, path: Path, source: int, k: int) -> None:
-    """Shift sample `k`, which follows no layer, with its neighbour `source`."""
-    if anchors.state[k] != FREE and anchors.layer[k] != NO_LAYER:
+    """Shift sample `k`, which follows no layer, with its neighbour `source`.
+
+    At the skin, and outside, it is beside the same layer as that.
+    """
+    is_outside = anchors.state[k] == FREE
+    if not is_outside and anchors.layer[k] != NO_LAYER:
         return
-    fall = 0.0 if anchors.state[k] == FREE else anchors.spacing
+    is_hidden = not is_outside and anchors.layer_cosine[k] == 0.0
     shift = path.aside[source]
-    left = max(abs(shift) - fall, 0.0)
+    left = max(abs(shift) - (0.0 if is_outside or is_hidden else anchors.spacing), 0.0)
     if left > abs(path.aside[k]):
         path.aside[k] = left if shift > 0.0 else -left
+    if is_hidden and anchors.layer[source] != NO_LAYER:
+        anchors.layer[k] = anchors.layer[source]
+        anchors.layer_cosine[k] = anchors.layer_cosine[source]
 
 
 @kernel
@@ -181,15 +195,17 @@ def _layer_beside(blade: BladeState, body: Body, path: Path, k: int, follows: bo
     anchors = blade.anchors
     t, at, reach = anchors.tetrahedron[k], vec3(anchors.rest, k), blade.reach
     found = _nearer_layer(blade, body, path, k, t, at)
-    if found.row == NO_LAYER:
+    if found.row < 0:
         last = walk(body, axpy(AHEAD * reach, vec3(path.forward, k), at), t)
         if last.inside:
             ahead = axpy(AHEAD * reach, vec3(path.forward, k), at)
             found = _nearer_layer(blade, body, path, k, last.tetrahedron, ahead)
+    if found.row == _AT_SKIN:
+        return found
     most = FOLLOWED_TO if follows else FOLLOWED_FROM
-    is_near = abs(found.aside) <= most * max(found.altitude, reach)
+    is_near = abs(found.aside) <= most * max(found.edge, reach)
     if found.row == NO_LAYER or not is_near or not _turns_into(blade, body, k, found):
-        return LayerAhead(NO_LAYER, 0.0, 1.0, 0.0)
+        return LayerAhead(NO_LAYER, 0.0, 1.0, 0.0, 0.0)
     return found
 
 
@@ -212,20 +228,21 @@ def _nearer_layer(
     right = _face_along(anchors.layer[k], body, t, start, scale(reach, sideways))
     left = _face_along(anchors.layer[k], body, t, start, scale(-reach, sideways))
     found = right
-    if right.row == NO_LAYER or (left.row != NO_LAYER and left.share < right.share):
+    if right.row < 0 or (left.row >= 0 and left.share < right.share):
         found = left
-    if found.row == NO_LAYER:
-        return LayerAhead(NO_LAYER, 0.0, 1.0, 0.0)
+    if found.row < 0:
+        return LayerAhead(min(left.row, right.row), 0.0, 1.0, 0.0, 0.0)
     normal = _normal(body, found.tetrahedron, found.face)
     across = dot(normal, sideways)
     corner = vec3(body.rest, body.tetrahedra[found.tetrahedron, (found.face + 1) % 4])
     if across == 0.0:
-        return LayerAhead(NO_LAYER, 0.0, 1.0, 0.0)
+        return LayerAhead(NO_LAYER, 0.0, 1.0, 0.0, 0.0)
     return LayerAhead(
         found.row,
         dot(sub(corner, vec3(anchors.rest, k)), normal) / across,
         abs(across),
         node_altitude(body.rest, body.tetrahedra, found.tetrahedron, found.face),
+        _mean_edge(body, found.tetrahedron, found.face),
     )
 
 
@@ -274,6 +291,8 @@ def _face_along(followed: int, body: Body, t: int, start: Vec3, ray: Vec3) -> Fa
         if row != NO_LAYER:
             return FaceOfLayer(row, t, through, when)
         if link < 0:
+            if link == OUTER and FARTHEST_LAYER * when <= FOLLOWED_TO:
+                return FaceOfLayer(_AT_SKIN, t, through, when)
             break
         t = link // 4
     return FaceOfLayer(NO_LAYER, 0, 0, 1.0)
@@ -287,3 +306,12 @@ def _normal(body: Body, t: int, f: int) -> Vec3:
     c = vec3(body.rest, body.tetrahedra[t, (f + 3) % 4])
     normal = cross(sub(b, a), sub(c, a))
     return scale(1.0 / norm(normal), normal)
+
+
+@kernel
+def _mean_edge(body: Body, t: int, f: int) -> float:
+    """Return the mean edge of a face at rest [m]."""
+    a = vec3(body.rest, body.tetrahedra[t, (f + 1) % 4])
+    b = vec3(body.rest, body.tetrahedra[t, (f + 2) % 4])
+    c = vec3(body.rest, body.tetrahedra[t, (f + 3) % 4])
+    return (norm(sub(b, a)) + norm(sub(c, b)) + norm(sub(a, c))) / 3.0

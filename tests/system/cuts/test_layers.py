@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support import strokes
-from tests.support.bodies import sides
+from tests.support.bodies import jittered_grid, sides
 from tissue import (
     Energies,
     FloatArray,
@@ -19,6 +19,7 @@ from tissue import (
     piece_of_tetrahedra,
 )
 from tissue.mesh.validation import signed_volumes
+from tissue.shapes.labelled_stuffing import stuff_labels
 
 SIZE = np.array([0.04, 0.04, 0.02])
 CELL, BORDER, SPEED = 0.005, 0.02, 0.1
@@ -121,6 +122,64 @@ def test_a_blade_led_within_half_an_element_of_a_weak_layer_dissects_along_it(be
         for each in (cut.before, cut.after)
     ]
     np.testing.assert_allclose(*volumes, rtol=1e-9)
+
+
+def shared_area(body: Snapshot) -> float:
+    """Return the area of the faces that the two labels share [m2]."""
+    faces = np.sort(body.tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3))
+    each, place, counts = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
+    labels = np.bincount(place.reshape(-1), weights=np.repeat(body.labels, 4))
+    x = body.rest_positions[each[(counts == 2) & (labels == 1)]]
+    return 0.5 * float(np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1).sum())
+
+
+@pytest.mark.parametrize("beside", [0.25, -0.45, 0.45])
+def test_a_bumpy_layer_is_dissected_whole(beside):
+    """Its nodes are shifted by up to 0.15 cells, those beside it too."""
+    mesh = jittered_grid(6, seed=1)
+    middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
+    mesh = mesh._replace(labels=(middles[:, 0] > BORDER).astype(np.int64))
+    tissue = Tissue(mesh, {None: TISSUE, (0, 1): LAYER}, fixed=sides(mesh), gravity=NO_GRAVITY)
+    before = shared_area(tissue.snapshot())
+    x = BORDER + beside * 0.04 / 6
+    results = strokes.make(tissue, strokes.upright(x, -0.004, 0.05, -0.004, 0.044, SPEED))
+    assert shared_area(tissue.snapshot()) == 0.0
+    assert results[-1].cut_area == pytest.approx(before, rel=1e-9)
+    steady = np.mean([-result.wrench.force[1] for result in results[200:340]])
+    assert steady == pytest.approx(LAYER * 0.04, rel=0.05)
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.25, -0.25])
+def test_a_curved_layer_is_followed(beside):
+    """A cylinder of 60 mm, in a mesh of the mesher. Where it meets the skin, a part stays whole."""
+    radius, half = 0.06, np.array([0.02, 0.02, 0.01])
+
+    def depth(points, label):
+        inside = (half - np.abs(points)).min(axis=1)
+        beyond = np.hypot(points[:, 0] + radius, points[:, 1]) - radius
+        return np.where(
+            label == 0, -inside, np.minimum(inside, np.where(label == 1, -1, 1) * beyond)
+        )
+
+    mesh = stuff_labels(depth, 2, [-half - 0.01, half + 0.01], 0.005)
+    mesh = mesh._replace(labels=mesh.labels - 1)
+    tissue = Tissue(
+        mesh, {None: TISSUE, (0, 1): LAYER}, fixed=sides(mesh, share=0.05), gravity=NO_GRAVITY
+    )
+    before = shared_area(tissue.snapshot())
+    poses = [
+        strokes.pose(
+            (r * np.cos(a) - radius, r * np.sin(a), -0.014),
+            (r * np.cos(a) - radius, r * np.sin(a), 0.014),
+            (-np.sin(a), np.cos(a), 0.0),
+        )
+        for r in [radius + beside * 0.0038]  # mean edge of the layer
+        for a in np.linspace(-0.024, 0.028, 521) / radius
+    ]
+    results = strokes.make(tissue, poses)
+    dissected = before - shared_area(tissue.snapshot())
+    assert dissected > 0.9 * before
+    assert dissected > 0.9 * results[-1].cut_area
 
 
 def test_a_cut_that_ends_in_the_layer_pays_for_its_depth():
