@@ -11,6 +11,7 @@ from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
 from .io.mesh_io import read_mesh_file as read_mesh_file
+from .io.mesh_io import stand_in as stand_in
 from .io.mesh_report import likely_unit as likely_unit
 from .io.whole_file import new_whole_file as new_whole_file
 from .io.whole_file import remove_unfinished as remove_unfinished
@@ -45,6 +46,7 @@ __all__ = [
     "signed_volumes",
     "OUTWARD",
     "sorted_faces",
+    "stand_in",
     "stuff_labels",
     "whole_file",
     "write_bundle",

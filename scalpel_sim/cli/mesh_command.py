@@ -4,6 +4,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 _MESH = Group("Mesh", sort_key=1)
 
 _SUFFIX = ".vtu"
+
+_BEGINNING = 200
+"""Bytes of a file that show whether it stands for another one."""
 
 
 @Parameter(name="*", group=_MESH)
@@ -105,6 +109,7 @@ def _meshed(
     from scalpel_sim.meshing.stuffing import stuff_volume
     from scalpel_sim.meshing.surface import SURFACE_FILES
 
+    _expect_itself(file)
     given = asdict(lengths)
     if is_label_volume(file):
         _expect_none(given, ("tolerance", "coarsen"), f"{file} is a label volume")
@@ -117,6 +122,20 @@ def _meshed(
         return repaired(file, **given, limits=allowed, on_progress=on_progress)
     filled = fill(file, **given, limits=allowed, on_progress=on_progress)
     return Meshed(filled.mesh, filled.notes())
+
+
+def _expect_itself(file: Path) -> None:
+    """Refuse a file that only stands for the one that was meant.
+
+    Raises:
+        UsageError: it is a web page, or what Git LFS leaves in its place.
+    """
+    from tissue.support import stand_in
+
+    with suppress(OSError), file.open("rb") as stream:  # readers say why a file cannot be read
+        found = stand_in(stream.read(_BEGINNING))
+        if found:
+            raise UsageError(f"{file}: {found}")
 
 
 def _expect_none(given: dict[str, Any], names: Sequence[str], reason: str) -> None:

@@ -196,16 +196,21 @@ def _contents(path: Path) -> bytes:
     return data
 
 
-def _other_content(data: bytes) -> str:
-    """Return what a file is instead of a mesh, where its first bytes show that, else ""."""
+def stand_in(data: bytes) -> str:
+    """Return what a file is that stands for the one that was meant, by its first bytes, or ""."""
     start = data[:200].lstrip().lower()
     if start.startswith((b"<!doctype html", b"<html")):
         return f"expected a mesh, found a web page: {shown(data.strip())}"
     if start.startswith(b"version https://git-lfs"):
         return "expected a mesh, found a Git LFS pointer: fetch the file itself with `git lfs pull`"
-    if start.startswith((b"\x1f\x8b", b"pk\x03\x04")):
-        return "expected a mesh, found a compressed file: unpack it first"
     return ""
+
+
+def _other_content(data: bytes) -> str:
+    """Return what a file is instead of a mesh, where its first bytes show that, else ""."""
+    if data.lstrip()[:4].lower().startswith((b"\x1f\x8b", b"pk\x03\x04")):
+        return "expected a mesh, found a compressed file: unpack it first"
+    return stand_in(data)
 
 
 def renumbered(mesh: TetrahedralMesh) -> tuple[TetrahedralMesh, IntArray]:

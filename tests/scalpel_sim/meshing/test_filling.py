@@ -107,3 +107,10 @@ def test_the_command_writes_a_mesh_and_tells_what_it_made(tmp_path, capsys):
     )
     assert command_line([*asked, "--scale", "0.001"]) == EXIT_WRONG_USE
     assert "exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["body.stl", "body.nii.gz", "body.msh"])
+def test_a_file_that_stands_for_another_is_told_as_such(name, tmp_path, capsys):
+    (tmp_path / name).write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:4c\n")
+    assert command_line(["mesh", str(tmp_path / name)]) == EXIT_WRONG_USE
+    assert "fetch the file itself with `git lfs pull`" in capsys.readouterr().err
