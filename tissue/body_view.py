@@ -145,7 +145,7 @@ def deformation_of(body: Body, elastic: Elastic) -> Deformation:
 
 
 class BodyView:
-    """What there is to read of the body of a `Tissue`."""
+    """The body of a `Tissue`, to be read."""
 
     material: Material
     """Material of the body; of several that which resists changes of volume most."""

@@ -27,7 +27,7 @@ SIDES = {
 """The body's sides: the axis, and whether the side is at its high end."""
 
 FLATNESS = 1e-5
-"""How far a flat side may depart from a plane, as a fraction of the body's extent along the axis.
+"""Largest departure of a flat side from a plane, as a fraction of the body's extent along the axis.
 
 Files in single precision depart by 1e-6. Larger than 1 / cells, and a grid loses its second layer.
 """
@@ -58,10 +58,10 @@ FACING_DOWN = 0.3
 upright. Less, and the sides of a round body would be held as well."""
 
 _SPHERE = "sphere:"
-"""What the text of a sphere begins with."""
+"""Beginning of the text of a sphere."""
 
 _LABEL = "label:"
-"""What the text of a label begins with."""
+"""Beginning of the text of a label."""
 
 _ROUNDING = 1e-9
 """Distance from a box, a sphere or a plane at which nodes are on it, in the body's extent."""

@@ -1,4 +1,4 @@
-"""How closely cuts follow the blade, against the time step: settings, and a report of the result.
+"""Closeness of cuts to the blade, against the time step: settings, and a report of the result.
 
 A cut that follows the blade closely leaves small tetrahedra, and the smallest one limits the time
 step. Snapping and the guard trade the one against the other.
@@ -20,7 +20,7 @@ would run along existing faces, up to an element off the blade's path."""
 
 @dataclass(frozen=True)
 class CutSettings:
-    """How closely cuts follow the blade, against how small the new elements are.
+    """Closeness of cuts to the path of the blade, against the size of new elements.
 
     Lengths are shares of the mesh's mean node size; the size of a node is the smallest altitude of
     the tetrahedra around it. Larger values give larger elements and time steps, and a rougher cut.

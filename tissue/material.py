@@ -93,7 +93,7 @@ class Material:
     on bone was measured at 0.29 to 0.36 (Shacham, Castel and Gefen 2010); a wet serous skin slips
     more easily."""
     law: _LawOrName = _LawOrName()
-    """How forces follow from deformation."""
+    """Law by which forces follow from deformation."""
     poisson_ratio: float = 0.45
     """Transverse contraction over extension. Springs alone have 1/4; for more each tetrahedron also
     resists a change of its volume, and less is impossible with springs. Soft tissue is mostly water

@@ -27,7 +27,7 @@ class SourcedValue(NamedTuple):
     value: float
     """The value in SI units."""
     measured: str
-    """How the material was loaded, and the scatter; or why the value was chosen."""
+    """Loading of the material and scatter; or why the value was chosen."""
     source: str = ""
     """Publication of the measurement; empty for a choice of ours."""
     is_confirmed: bool = True

@@ -1,4 +1,4 @@
-"""How a tissue is cut and moved, whatever it is made of."""
+"""Settings by which a tissue is cut and moved, whatever it is made of."""
 
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ of its mass. At 5,000 it is 1 %, and shows in the force (1.2 % of its peak); at 
 taken."""
 
 ELEMENTS = ("averaged", "plain")
-"""How tetrahedra are strained by the motion of their nodes."""
+"""Ways in which tetrahedra are strained by the motion of their nodes."""
 
 PRECISIONS = ("double", "single")
 """Precisions in which forces of tetrahedra can be computed."""
@@ -26,12 +26,12 @@ class SolverSettings:
     """
 
     scheme: str = "stellar"
-    """How the mesh is cut: `stellar`, or `paper` for that of Bielser, Maiwald and Gross, with its
+    """Scheme of cutting: `stellar`, or `paper` for that of Bielser, Maiwald and Gross, with its
     limits (`tissue.cutting.bielser_1998`)."""
     cut: CutSettings = field(default_factory=CutSettings)
-    """How closely cuts follow the blade, where the scheme lets one choose."""
+    """Closeness of cuts to the blade, where the scheme lets one choose."""
     relaxation: str | IntegratorOptions = "global"
-    """How the motion is advanced: `global`, all nodes together by a Runge-Kutta-Nystroem method;
+    """Method of motion: `global`, all nodes together by a Runge-Kutta-Nystroem method;
     `verlet`, all nodes by position Verlet, up to 1.5 times as fast; `hierarchical`, near the blade
     more often; `paper`, the same as printed, with nodes far from the blade that do not move; or one
     of their classes with settings."""
@@ -42,7 +42,7 @@ class SolverSettings:
     `CutReport.now.added_mass` says how much it is. For the laws of tetrahedra; where the elements
     of the uncut body are faster, their frequency is the limit."""
     element: str = "averaged"
-    """How tetrahedra are strained under the laws of solids: `averaged`, a share of the shear by
+    """Strain of tetrahedra under the laws of solids: `averaged`, a share of the shear by
     gradients averaged around nodes (`tissue.elasticity.averaged_shear`), so that coarse meshes
     bend and twist as a solid; or `plain`, each by itself. Volume is averaged around nodes either
     way. Under the law `springs` these carry the shear, and both are the same."""
@@ -50,7 +50,7 @@ class SolverSettings:
     """Precision in which the forces of tetrahedra are computed: `double`, or `single`, which takes
     two thirds of the time. Positions and velocities are double either way."""
     threads: int = 1
-    """How many threads share the loops over the body. The result is the same to the last bit;
+    """Number of threads that share the loops over the body. The result is the same to the last bit;
     with the relaxation `global` or `verlet`. More than one pays only where no other program needs
     the cores: the others look for work for 1 ms at a time before they sleep."""
     audit: bool = False

@@ -19,7 +19,7 @@ BoxNumbers = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Lowest and highest corner of a box [m], in plain numbers."""
 
 SurfaceQuantity = Literal["displacement", "strain", "stress"]
-"""What a picture can show of the deformation: see `Tissue.surface_values`."""
+"""Measures of deformation that a picture can show: see `Tissue.surface_values`."""
 
 SKIN_COLOUR = (156, 63, 50, 255)
 CUT_COLOUR = (212, 68, 60, 255)
@@ -127,7 +127,7 @@ class StageTimes(NamedTuple):
 
 
 class BodyContacts(NamedTuple):
-    """How the body touched itself and the floor in one step."""
+    """Contact of the body with itself and the floor in one step."""
 
     n_contacts: int
     """Number of contacts that pressed at the end of the step: node on triangle, edge on edge, node
@@ -369,7 +369,7 @@ class Piece(NamedTuple):
 
 
 class SchemeStatistics(NamedTuple):
-    """What the paper's scheme did to a mesh since the body was made, and what it left behind."""
+    """Work of the paper's scheme on a mesh since the body was made, and what it left behind."""
 
     n_cut: int
     """Tetrahedra of the initial mesh that were split."""

@@ -16,7 +16,7 @@ from tissue.geometry.tetrahedron import Weights, barycentric_in, smallest_weight
 from tissue.mesh.body import Body
 
 OVERHANG = 0.5
-"""How far outside the tetrahedron the anchor is where it is held by the new mesh alone, as a share
+"""Distance of the anchor from the tetrahedron where it is held by the new mesh alone, as a share
 of the tetrahedron's altitude there. At 0.01, 0.25, 0.5 and 1 the force of steady cuts (60 J/m2,
 30 kPa) falls to 0.88, 0.92, 0.94 and 0.96 of its mean at the lowest, and the mean is 1.01, 1.00,
 0.985 and 0.97 of toughness times depth: far out the field of the tetrahedron is not that of the

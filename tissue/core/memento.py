@@ -228,10 +228,10 @@ def derived_in(rules: StateRules, kind: type) -> dict[str, Callable[[], Any]]:
 
 
 class _Kind(NamedTuple):
-    """How objects of a class are walked under some rules."""
+    """Way in which objects of a class are walked under some rules."""
 
     order: int
-    """What they are: `_LEAF`, `_OBJECT` and so on."""
+    """Kind of the objects: `_LEAF`, `_OBJECT` and so on."""
     own: frozenset[str] = frozenset()
     """Attributes that are no state."""
     derived: Mapping[str, Callable[[], Any]] = MappingProxyType({})
@@ -239,7 +239,7 @@ class _Kind(NamedTuple):
 
 
 class _Kinds(dict[type, _Kind]):
-    """How objects of each class are walked under some rules."""
+    """Ways in which objects of each class are walked under some rules."""
 
     def __init__(self, rules: StateRules) -> None:
         super().__init__({kind: _Kind(_LEAF) for kind in _ATOMS})

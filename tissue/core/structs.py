@@ -109,7 +109,7 @@ class Arrays:
     """
 
     n_made: ClassVar[int] = 0
-    """How many structs were made: while it stays, no struct was replaced by a new one."""
+    """Number of structs that were made: while it stays, no struct was replaced by a new one."""
     _numba_type_: ArraysType
     _types: ClassVar[dict[Any, ArraysType]] = {}
     _most_types: ClassVar[int] = 1

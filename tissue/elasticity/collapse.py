@@ -1,4 +1,4 @@
-"""What keeps tetrahedra from turning inside out under law springs, whose springs do not.
+"""A force that keeps tetrahedra from turning inside out under law springs, which alone do not.
 
 The springs along the edges of a tetrahedron are at rest in its mirror image, too. One that is
 pressed flat may come out on the other side and stays there: in a block that was held at two sides,
@@ -31,7 +31,7 @@ increment. Smaller: more is listed so late that it begins to resist where it is,
 larger: more of what never comes to the limit is listed."""
 
 FASTEST_CHANGE: Final = 6.0
-"""How fast J changes at most, in speeds of the fastest node over the node size: three altitudes,
+"""Highest rate of change of J, in speeds of the fastest node over the node size: three altitudes,
 each between nodes that go opposite ways. What cannot be flat so soon is not looked at."""
 
 INCREMENTS_AHEAD: Final = 2.0
@@ -42,7 +42,7 @@ J_LIMIT: Final = 0.3
 that of the springs; smaller: the term must be stiffer to turn what moves at the same speed."""
 
 LARGEST_ADDED_SHARE: Final = 2.0
-"""What one tetrahedron may add to w^2 of its nodes, as a share of the bound of the body at rest.
+"""Most that a tetrahedron adds to w^2 of its nodes, as a share of the bound of the body at rest.
 Larger: slivers, whose altitudes are small, make steps short; smaller: slivers turn over."""
 
 _UNKNOWN: Final = -1.0
@@ -57,7 +57,7 @@ class Collapsing(Arrays):
     n: IntCell
     """Number of tetrahedra that are listed."""
     slack: FloatCell
-    """How far J of those that are not listed may fall until one may be listed."""
+    """Fall of J of those that are not listed after which one may be listed."""
     highest: FloatCell
     """Bound on w^2 at their nodes, with that of the springs [1/s2]; 0 where none is listed."""
     listed: IntArray = sized("tetrahedra")

@@ -33,9 +33,9 @@ class Elastic(Arrays, two_precisions=True):
     solid: Solid
     """Tetrahedra as elements; empty where springs alone are elastic."""
     viscosity: Viscosity
-    """How they resist their rate of deformation; empty where springs act, or without viscosity."""
+    """Resistance to their rate of deformation; empty where springs act, or without viscosity."""
     collapsing: Collapsing
-    """What keeps tetrahedra from turning inside out where springs alone are elastic."""
+    """Forces that keep tetrahedra from turning inside out where springs alone are elastic."""
     has_springs: IntCell
     """1 if springs along the edges pull, else 0."""
     has_tetrahedra: IntCell

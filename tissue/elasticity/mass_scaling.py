@@ -183,7 +183,7 @@ class AddedMassShares(NamedTuple):
     """Mass that mass scaling has added, as a share of the body's own."""
 
     now: float
-    """What nodes have."""
+    """Mass and stiffness of nodes."""
     largest: float
     """The most that they had so far."""
 

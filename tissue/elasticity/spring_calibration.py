@@ -60,7 +60,7 @@ class Effective(NamedTuple):
 
 
 class SpringError(NamedTuple):
-    """How far a network of springs is from the material that it stands for."""
+    """Deviation of a network of springs from the material that it stands for."""
 
     asked: Effective
     """The material's own constants."""

@@ -55,7 +55,7 @@ class Attachments(Arrays):
     other_weights: FloatArray
     """Their barycentric weights, shape (n, 4): 0 where it is none."""
     begin: FloatArray
-    """What each is attached to, at the begin of the time step [m], shape (n, 3)."""
+    """Place that each is attached to, at the begin of the time step [m], shape (n, 3)."""
     end: FloatArray
     """The same at its end [m]."""
     stiffness: FloatArray
@@ -245,7 +245,7 @@ def count_impulse(attachments: Attachments, p: int, at: Vec3, impulse: Vec3) -> 
 
 
 class _Pull(NamedTuple):
-    """What a spring and its damper do."""
+    """Force and loss of a spring and its damper."""
 
     force: Vec3
     """Force on the point [N]."""

@@ -91,7 +91,7 @@ class StepContext(Arrays, two_precisions=True):
     body: Body
     """Positions and velocities are written."""
     elastic: Elastic
-    """What the forces inside the body follow from."""
+    """Data from which the forces inside the body follow."""
     blade: BladeState
     """The blade: it acts in every stage, and slips after every step."""
     contacts: PenaltyForces

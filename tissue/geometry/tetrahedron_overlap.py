@@ -1,4 +1,4 @@
-"""How deep two tetrahedra lie in each other: by the axis along which that is least."""
+"""Depth to which two tetrahedra lie in each other: by the axis along which that is least."""
 
 import itertools
 

@@ -49,14 +49,14 @@ without velocity the motion would never end."""
 STEPS_BETWEEN_CHECKS = 1000
 """Steps between two checks that no part of the body falls away."""
 DISTURBANCE = 1e-3
-"""How far a node is moved so that it leaves an equilibrium that is not stable, per mean node size:
+"""Displacement by which a node leaves an equilibrium that is not stable, per mean node size:
 in one where disturbances grow at 20 /s it is then accelerated by more than `SETTLED`."""
 FARTHEST_HELD = 10.0
-"""How far a node may go, per diagonal of the box around the body: what goes farther is not held."""
+"""Longest way of a node, per diagonal of the box around the body; beyond, it is not held."""
 
 
 class Motion(NamedTuple):
-    """How a body moves after some steps."""
+    """Motion of a body after some steps."""
 
     accelerations: FloatArray
     """Accelerations of its nodes but for damping [m/s2], shape (n_nodes, 3)."""
@@ -65,7 +65,7 @@ class Motion(NamedTuple):
 
 
 class Settling(NamedTuple):
-    """How a body came to rest."""
+    """Account of a body that came to rest."""
 
     n_steps: int
     """Steps that it took."""

@@ -41,7 +41,7 @@ class OwnWeight(NamedTuple):
     extent: float
     """Longest side of the box around the body at rest [m]."""
     length: float
-    """How far its material is from what holds it, at most [m]."""
+    """Largest distance of its material from what holds it [m]."""
     pressure: float
     """Weight of that length, per area [Pa]."""
     young_modulus: float

@@ -105,7 +105,7 @@ WhenDamped = Literal["step", "stage"]
 """When the damping acts: between steps, or in every stage of them."""
 
 Far = Literal["moved", "frozen"]
-"""What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen` (the paper)."""
+"""Fate of nodes beyond the last ring: `moved` once a frame, or `frozen` (the paper)."""
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ _WRITE_MEANS = SameTypes(write_node_means)
 
 
 class Numerics(NamedTuple):
-    """How the motion of a body is computed, as far as its arrays depend on it."""
+    """Settings of the motion of a body, as far as its arrays depend on it."""
 
     mass_scaling: float | None
     """Frequency above which nodes get mass [1/s]; see `Elasticity`."""
@@ -128,7 +128,7 @@ class TissueModel:
         self.has_fibres = False
         """Whether any of them is a fibre, which the blade can cut."""
         self.added_by_attachments = 0.0
-        """What they add to w^2 of the body at most [1/s2]."""
+        """Amount that they add to w^2 of the body at most [1/s2]."""
         self.geoms = no_geoms(body, self.node_size)
         """Contact with rigid geoms."""
         self.cores = RigidCores()

@@ -22,7 +22,7 @@ class StepChoice(Arrays):
     n_steps: IntCell
     """Steps of the part that is taken next."""
     refinement: IntCell
-    """How many times as many steps are taken as motion and stability require."""
+    """Steps that are taken over those that motion and stability require."""
     is_at_rest: IntCell
     """1 while the body is not moved, as it was nearly at rest and nothing touches it, else 0."""
     is_unstable: IntCell
@@ -57,9 +57,9 @@ class StepChoice(Arrays):
     allowed: FloatCell
     """Up to which w^2 it was not brought near the truth [1/s2]."""
     moved: FloatCell
-    """How far nodes have moved since, at most [m]."""
+    """Farthest that a node has moved since [m]."""
     resting: FloatCell
-    """How long the body has been nearly at rest, and nothing has touched it [s]."""
+    """Time for which the body has been nearly at rest, and nothing has touched it [s]."""
     resting_positions: FloatArray
     """Where the nodes were when that began [m], shape (n_nodes, 3)."""
     speed: FloatCell

@@ -45,7 +45,7 @@ STEPS_BETWEEN_STRAIN_BOUNDS: Final = 2
 pinched, is as much shorter within a frame of eight steps as an element is long."""
 
 MOTION_BETWEEN_STRAIN_BOUNDS: Final = 0.001
-"""How far a node may move from one bound to the next where there are more steps between them, as a
+"""Longest way of a node from one bound to the next where there are more steps between them, as a
 share of the node size: some percent of the least altitude of slivers. With 0.01 slivers of the
 organ kept trembling at 0.06 m/s a second after ten strokes; with this they are at rest. A bound
 takes as long as half a step: without this a body at rest would be evaluated as often as one that
@@ -56,7 +56,7 @@ _SAME_LIMIT = 1e-6
 where steps are as long as before."""
 
 LONGEST_MOTION: Final = 0.5
-"""How far the fastest node moves in a step, as a share of the node size, at most. A bound on
+"""Largest motion of the fastest node in a step, as a share of the node size. A bound on
 frequencies holds where the body is; what moves farther may be stiffer before the next bound. With
 less, strokes take more steps; without it, a body far from rest can become unstable."""
 

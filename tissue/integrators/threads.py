@@ -24,7 +24,7 @@ does where the cores are busy: one call after the first time, then 3, 7 and so o
 nothing made steps longer by up to a third."""
 
 _LONGEST_END = 1.0
-"""How long to wait for a thread to end [s], which takes it `LONGEST_SPIN` where it runs."""
+"""Longest wait for a thread to end [s], which takes `LONGEST_SPIN` where it runs."""
 
 
 class Threads:

@@ -55,7 +55,7 @@ _BEGINNINGS: tuple[tuple[re.Pattern[bytes], Callable[[bytes], MeshFile]], ...] =
     (re.compile(rb"(?i)(?:\s*\*\*[^\n]*\n)*\s*\*(?:HEADING|NODE|PART|PREPRINT)\b"), read_abaqus),
     (re.compile(rb"(?i)(?:\s*\$[^\n]*\n)*\s*(?:SOL |CEND|BEGIN +BULK|GRID[*, ])"), read_nastran),
 )
-"""How the files of each format begin: what counts, whatever their suffix says."""
+"""Beginning of the files of each format: what counts, whatever their suffix says."""
 
 SUFFIXES = (*_READERS, *_TETGEN)
 """Suffixes of the files that are read."""

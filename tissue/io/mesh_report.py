@@ -1,4 +1,4 @@
-"""What is in the file of a mesh, and how good its tetrahedra are."""
+"""Contents of the file of a mesh, and quality of its tetrahedra."""
 
 import math
 import os
@@ -57,7 +57,7 @@ class MeshShape(NamedTuple):
 
 
 class MeshReport(NamedTuple):
-    """What is in the file of a mesh."""
+    """Contents of the file of a mesh."""
 
     format: str
     """Format of the file."""
@@ -72,7 +72,7 @@ class MeshReport(NamedTuple):
     box: FloatArray
     """Lowest and highest corner of the body [m], shape (2, 3)."""
     remarks: tuple[str, ...]
-    """What is made of the file, repaired, or doubtful."""
+    """Remarks: choices, repairs and doubts."""
     fault: str | None
     """Why the mesh is refused; None where it is not."""
     shape: MeshShape | None

@@ -44,7 +44,7 @@ class EnergyDensity(Arrays):
     shear_modulus: float
     """Shear modulus at small strain [Pa]."""
     excess: float
-    """What the parts of lam have more than Lame's constant, for the shear term has less [Pa]."""
+    """Amount by which the parts of lam exceed Lame's constant, for the shear term has less [Pa]."""
     exponent: float
     """b of the exponential law; 0 under another law."""
     second: float

@@ -1,4 +1,4 @@
-"""What drives a body from outside: loads on material points, and supports that move.
+"""Loads on material points, and supports that move: the drives of a body from outside.
 
 material_points    points of the material, which survive cuts
 attachment         springs to a frame that is moved from outside, and fibres that the blade cuts

@@ -36,9 +36,9 @@ class AttachmentList:
         self._released: list[Attachment] = []
         self._n_added = 0
         self.arrays: Attachments = no_attachments()
-        """What kernels work on; another one where attachments come or go."""
+        """Arrays that kernels work on; others where attachments come or go."""
         self.added_frequency_squared = 0.0
-        """What they add to w^2 of the body at most [1/s2]."""
+        """Amount that they add to w^2 of the body at most [1/s2]."""
         self._edge_length = 0.0
         self.has_fibres = False
         """Whether any is a fibre that the blade can cut."""

@@ -25,7 +25,7 @@ _HOLDS = "nodes are supports where `Tissue(fixed=...)` says so"
 
 
 class StepInputs(NamedTuple):
-    """What a step begins with that is not in the body: references to what is never written."""
+    """Start of a step outside the body: references to what is never written."""
 
     sweep: BladeSweep | None
     """Motion of the blade."""

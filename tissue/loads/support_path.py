@@ -142,7 +142,7 @@ class LedSupports:
         self._seconds = [self._seconds[k] for k in kept]
 
     def _follow_mesh(self, body: Body) -> None:
-        """Let new fixed nodes be led as the fixed node next to them at rest is."""
+        """Lead new fixed nodes as the fixed node next to them at rest."""
         known, n = len(self._path_of), body.n_nodes
         if known == n:
             return

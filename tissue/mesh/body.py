@@ -88,7 +88,7 @@ class Body(Arrays):
     hanging: Hanging
     """Faces of two sizes that meet; empty unless the paper's scheme cuts."""
     materials: MaterialArrays
-    """What tetrahedra are made of."""
+    """Materials of the tetrahedra."""
     interfaces: Interfaces
     """Layers between labels."""
 

@@ -30,7 +30,7 @@ def version_now() -> str:
 
 
 class Identity(NamedTuple):
-    """What a state must share with the tissue that it is loaded into."""
+    """Properties that a state shares with the tissue that it is loaded into."""
 
     version: str
     """Version of the program."""

@@ -188,4 +188,4 @@ def _of_search(search: Any) -> Iterable[RowsInUse]:
 
 
 STRUCTS = StructRules(SCRATCH, rows_in_use)
-"""What of the memory of structs is state."""
+"""Parts of the memory of structs that are state."""

@@ -23,7 +23,7 @@ _TREE = "tree"
 """Name of the JSON in the bytes of a state."""
 
 _BESIDE = "beside_"
-"""What the names of arrays begin with that are written with a state."""
+"""Beginning of the names of arrays that are written with a state."""
 
 NOTHING: Mapping[str, np.ndarray] = MappingProxyType({})
 """No arrays."""
@@ -59,7 +59,7 @@ RULES = StateRules(
         for kind in (Attachment, FramePath, Geom, Ligament, Load, MaterialPoints, SupportPath)
     },
 )
-"""What of a tissue is its state."""
+"""Parts of a tissue that are its state."""
 
 
 class Around(NamedTuple):
@@ -68,7 +68,7 @@ class Around(NamedTuple):
     root: Any
     """Its root."""
     rules: StateRules
-    """What of it is no state; the tissue has rules of its own."""
+    """Parts of it that are no state; the tissue has rules of its own."""
 
 
 class TissueState:

@@ -61,7 +61,7 @@ class CheckedSteps:
         """Number of steps that went wrong, and were done again in shorter ones."""
         self.watch = StepWatch(stages.model, stages.model.body.materials.wave_speed)
         self.inputs: list[StepInputs] = []
-        """What acted in each time step since a state was saved."""
+        """Forces that acted in each time step since a state was saved."""
         self._state: Memento | None = None
         self._n_substeps = 0
         self._spares = Spares()

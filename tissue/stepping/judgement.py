@@ -143,9 +143,9 @@ class StepBounds(Arrays):
     """Quantities by which a step of a body is judged."""
 
     before: FloatArray
-    """What `write_look` wrote before the step, shape (`LOOK_NUMBERS`,)."""
+    """Numbers that `write_look` wrote before the step, shape (`LOOK_NUMBERS`,)."""
     after: FloatArray
-    """What it wrote after the step that was judged last, shape (`LOOK_NUMBERS`,)."""
+    """Numbers that it wrote after the step that was judged last, shape (`LOOK_NUMBERS`,)."""
     without_gravity: FloatCell
     """Energy of the body when counting began: elastic and kinetic, and in all that holds and
     touches it [J]."""

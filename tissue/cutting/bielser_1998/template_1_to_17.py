@@ -94,7 +94,7 @@ class Presplit(NamedTuple):
     part: IntArray
     """Corner that each child belongs to, or CENTRE; shape (17,)."""
     inner: IntArray
-    """What is behind each face of each child: 4 * child + its face, or -1 on a face of ABCD; shape
+    """Cell behind each face of each child: 4 * child + its face, or -1 on a face of ABCD; shape
     (17, 4)."""
     triangle: IntArray
     """Which of the ten triangles between parts each face is, or -1; shape (17, 4)."""

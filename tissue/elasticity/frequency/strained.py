@@ -63,7 +63,7 @@ class StepLimit(NamedTuple):
     allowed: float
     """Bound on w^2 of the tetrahedra [1/s2] up to which it is."""
     added: float
-    """What blade and contact add to that bound [1/s2]."""
+    """Share of blade and contact in that bound [1/s2]."""
     n_steps: int
     """The number of steps; 0 where a bound above `allowed` is to be near the truth in any case."""
 

@@ -57,7 +57,7 @@ three of the first; and a row is filled up."""
 
 
 class LocalClocks(Arrays):
-    """How a neighbour sees each node: on a straight line since the node was moved last."""
+    """Each node as a neighbour sees it: on a straight line since the node was moved last."""
 
     origins: FloatArray
     """Position on the line at the begin of the frame [m], shape (capacity, 3). Its direction is
@@ -67,7 +67,7 @@ class LocalClocks(Arrays):
     frames: IntArray
     """Number of the frame that moved it last, shape (capacity,)."""
     seen: FloatArray
-    """What the node that is being moved sees of its neighbours, eight after eight: origins and
+    """Neighbours as the node that is being moved sees them, eight after eight: origins and
     velocities of their lines, vectors to them [m], and stiffness by squared length [N/m3]."""
     frame: IntCell
     """Number of the last frame."""
