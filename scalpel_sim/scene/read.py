@@ -263,7 +263,12 @@ def _replaced(content: Any, key: Sequence[str], value: Any) -> Any:
     """Return a content with the value at a key replaced."""
     first, rest = key[0], key[1:]
     if isinstance(content, list):
-        if not (first.isdecimal() and int(first) < len(content)):
+        if not first.isdecimal():
+            raise UsageError(
+                f"the scene has {len(content)} of these, each with '{first}'; say which, 0 to "
+                f"{len(content) - 1}, as in --set TABLE.0.{first}=VALUE"
+            )
+        if int(first) >= len(content):
             raise UsageError(
                 f"'{first}' is no row; it must be a number from 0 to {len(content) - 1}"
             )

@@ -179,9 +179,70 @@ def test_wrong_bodies_get_one_line_that_says_what_is_wrong(name, tmp_path, capsy
     assert len(lines) == 1 and expected in lines[0]
 
 
+TWO_HANDS = """
+[[body]]
+name = "muscle"
+shape = "block"
+cells = [12, 8, 2]
+size = [0.06, 0.04, 0.010]
+fixed = "bottom"
+material = { preset = "muscle", law = "neo_hookean", toughness = 20.0 }
+
+[[body]]
+name = "flap"                                 # lies on the muscle, and reaches beyond it
+shape = "block"
+cells = [12, 6, 2]
+size = [0.06, 0.03, 0.009]
+pos = [0.02, 0.005, 0.010]
+fixed = "left"
+material = { preset = "gelatin" }
+
+[[grasper]]
+closed = 0.0085
+motion = [
+  { time = 0, at = [0.11, 0.02, 0.0145], approach = [-1, 0, 0], across = [0, 0, 1], opening = 0.02},
+  { time = 0.4, at = [0.077, 0.02, 0.0145] },
+  { time = 0.7, opening = 0.008 },
+  { time = 2.4 },
+  { time = 2.9, at = [0.09, 0.02, 0.03] },
+]
+
+[[stroke]]
+kind = "points"
+points = [[0.035, -0.012, 0.004], [0.035, 0.055, 0.004]]
+edge = [0.0, 0.0, 1.0]
+forward = [0.0, 1.0, 0.0]
+length = 0.03
+speed = 0.05
+wait = 0.7
+"""
+"""One hand holds the end of a flap, the other cuts it off, and 6 mm into what lies under it."""
+
+
+def test_two_hands_meet_two_bodies(tmp_path):
+    out = tmp_path / "out"
+    scene = written(tmp_path, TWO_HANDS)
+    assert command_line(["run", str(scene), "-q", "--seconds", "3.2", "--out", str(out)]) == EXIT_OK
+    summary = json.loads((out / "summary.json").read_text())
+    muscle, flap = summary["labels"]
+    assert (muscle["pieces"], flap["pieces"]) == (1, 2)
+    assert muscle["cut_area_m2"] == pytest.approx(0.04 * 0.006, rel=0.1)
+    assert flap["cut_area_m2"] == pytest.approx(0.03 * 0.009, rel=0.05)
+    loose = max((each for each in summary["each_piece"] if not each["held"]), key=volume_of)
+    weight = loose["volume_m3"] * MATERIALS["gelatin"].material.density * 9.81
+    rows = np.genfromtxt(out / "forces.csv", delimiter=",", names=True)
+    held = rows["left_force_z_n"][-200:].mean()
+    assert held == pytest.approx(-weight, rel=0.05)  # of the tissue on the grasper
+
+
+def volume_of(piece):
+    return piece["volume_m3"]
+
+
 def test_options_of_one_body_are_refused(tmp_path, capsys):
     words = ["run", str(written(tmp_path)), "--fix", "bottom", "--out", str(tmp_path / "out")]
     assert command_line(words) == EXIT_WRONG_USE
-    assert "--fix: 'fixed' is no row; it must be a number from 0 to 1" in capsys.readouterr().err
+    expected = "--fix: the scene has 2 of these, each with 'fixed'; say which, 0 to 1, as in --set"
+    assert expected in capsys.readouterr().err
     with pytest.raises(UsageError, match="stretch is of one body, and the scene has several"):
         changed(read_scene(written(tmp_path)), stretch=0.1)
