@@ -6,7 +6,7 @@ import pytest
 from tests.support import strokes
 from tests.support.bodies import sides
 from tests.system.forces.test_several_materials import BOTH, NO_GRAVITY, SIZE, SOFT, X, labelled
-from tissue import BladeSegment, BladeShape, Tissue
+from tissue import BladeSegment, BladeShape, Snapshot, Tissue
 
 DEPTHS = np.array([0.012, 0.008])
 """Depth of the two layers that are cut at once [m]."""
@@ -20,8 +20,8 @@ def drawn(tissue: Tissue, end: float = 0.044):
     return strokes.make(tissue, poses), np.array([pose.tip[1] for pose in poses[1:]])
 
 
-def layers(**options) -> Tissue:
-    mesh = labelled(2, DEPTHS[0])
+def layers(depth: float = DEPTHS[0], **options) -> Tissue:
+    mesh = labelled(2, depth)
     return Tissue(mesh, BOTH, fixed=sides(mesh), gravity=NO_GRAVITY, **options)
 
 
@@ -32,12 +32,37 @@ def force_on_edge(result, forward) -> float:
     return float(contacts.normal_force[at_edge].sum())
 
 
-def test_work_and_force_in_each_layer_are_its_toughness_times_its_depth():
-    results, y = drawn(layers())
-    work = results[-1].cutting_of_labels
-    np.testing.assert_allclose(work, [20.0, 60.0] * DEPTHS * SIZE[1], rtol=0.05)
+@pytest.mark.parametrize("depth", [0.005, 0.01, 0.015])
+def test_the_force_in_each_layer_is_its_toughness_times_its_depth(depth):
+    results, y = drawn(layers(depth))
     steady = [r.force_of_labels for r, at in zip(results, y, strict=True) if 0.015 < at < 0.03]
-    np.testing.assert_allclose(np.mean(steady, axis=0), [20.0, 60.0] * DEPTHS, rtol=0.05)
+    expected = [20.0, 60.0] * np.array([depth, SIZE[2] - depth])
+    np.testing.assert_allclose(np.mean(steady, axis=0), expected, rtol=0.05)
+
+
+def cut_areas(before: Snapshot, after: Snapshot) -> np.ndarray:
+    """Return the area of the faces of cuts of each of two labels, one side [m2]."""
+    grown = np.zeros(2)
+    for body, sign in ((before, -0.5), (after, 0.5)):
+        corners = body.tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)
+        faces, first, counts = np.unique(
+            np.sort(corners, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        a, b, c = body.rest_positions[faces[counts == 1]].transpose(1, 0, 2)
+        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        labels = body.labels[first[counts == 1] // 4]
+        grown += sign * np.bincount(labels, weights=areas, minlength=2)
+    return grown
+
+
+def test_the_work_in_each_layer_is_its_toughness_times_the_area_cut_of_it():
+    """The border is jagged by a cell: labels are of whole tetrahedra."""
+    tissue = layers()
+    before = tissue.snapshot()
+    work = drawn(tissue)[0][-1].cutting_of_labels
+    areas = cut_areas(before, tissue.snapshot())
+    np.testing.assert_allclose(areas, DEPTHS * SIZE[1], rtol=0.05)
+    np.testing.assert_allclose(work, [20.0, 60.0] * areas, rtol=0.05)
 
 
 @pytest.mark.parametrize("blade", [None, SHAPE], ids=["line", "scalpel"])
