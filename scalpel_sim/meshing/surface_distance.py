@@ -12,8 +12,8 @@ SAMPLES_OF_SIZE = 60
 """Places along the size of the body at which the distance is measured at least, besides corners."""
 
 NEAR_TRIANGLES = 12
-"""Triangles by whose middles a place is near, among which the nearest is sought. Another one may be
-nearer still: then the distance is less than it is said to be."""
+"""Triangles near a place by their middles, among which the nearest is sought first; then twice as
+many, until no other one can be nearer."""
 
 MOST_ANGLES = 4e8
 """Solid angles of triangles that are summed at most, some 20 s: where more places are in doubt, the
@@ -47,12 +47,22 @@ class _Samples(NamedTuple):
 
         closest: Any = triangles.closest_point  # has no types
         corners = self.points[self.triangles]
-        n_near = min(NEAR_TRIANGLES, len(corners))
-        near = cKDTree(corners.mean(axis=1)).query(points, k=n_near)[1].reshape(len(points), -1)
-        least = np.full(len(points), np.inf)
-        for k in range(n_near):
-            ways = np.linalg.norm(closest(corners[near[:, k]], points) - points, axis=1)
-            least = np.fmin(least, ways)
+        middles = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - middles[:, None], axis=2).max()
+        tree, least = cKDTree(middles), np.full(len(points), np.inf)
+        unsure, n_near = np.arange(len(points)), NEAR_TRIANGLES
+        while len(unsure):
+            n_near = min(n_near, len(corners))
+            far, near = tree.query(points[unsure], k=np.arange(1, n_near + 1))
+            for k in range(n_near):
+                ways = np.linalg.norm(
+                    closest(corners[near[:, k]], points[unsure]) - points[unsure], axis=1
+                )
+                least[unsure] = np.fmin(least[unsure], ways)
+            if n_near == len(corners):
+                break
+            unsure = unsure[far[:, -1] - reach < least[unsure]]
+            n_near *= 2
         return least
 
     def normals(self) -> FloatArray:

@@ -57,7 +57,7 @@ def test_a_rim_that_the_mesher_rounds_is_filled_again_until_it_is_kept(tmp_path)
     assert made.sizes.tolerance < made.bound  # the envelope of the mesher had to be closer
     rim = made.surface.vertices[np.abs(made.surface.vertices[:, 2]) < 1e-6]
     skin = trimesh.Trimesh(made.mesh.positions, boundary_faces(made.mesh.tetrahedra))
-    places = skin.sample(100_000, seed=0)
+    places = trimesh.sample.sample_surface(skin, 100_000, seed=0)[0]
     assert cKDTree(places).query(rim)[0].max() < 1.2 * made.bound
 
 
