@@ -31,7 +31,7 @@ ON_LAYER = 1e-9
 
 
 class Drawn(NamedTuple):
-    """What a blade came to that was drawn through a body along y."""
+    """Forces and areas of a stroke along y through a body."""
 
     before: Snapshot
     after: Snapshot
