@@ -109,7 +109,7 @@ def made_gallbladder() -> TetrahedralMesh:
 
 
 def gallbladder() -> TetrahedralMesh:
-    """Return the mesh in `GALLBLADDER_FILE`, which `made_gallbladder` made: 73 x 26 x 40 mm."""
+    """Return the mesh in `GALLBLADDER_FILE`, which `made_gallbladder` made: 73 x 23 x 40 mm."""
     with np.load(GALLBLADDER_FILE, allow_pickle=False) as file:
         return TetrahedralMesh(
             file["positions"],

@@ -16,8 +16,6 @@ NEAR_TETRAHEDRA = 24
 PLACES = np.vstack([np.full((1, 4), 0.25), 0.15 + 0.4 * np.eye(4)])
 """Places in a new tetrahedron whose labels are counted, as shares of its nodes."""
 
-_PERCENT = 100.0
-
 
 def with_old_labels(
     new: "TetrahedralMesh", old: "TetrahedralMesh"
@@ -49,7 +47,7 @@ def with_old_labels(
     volumes = signed_volumes(new.positions, new.tetrahedra)
     changes = [
         f"{old.label_names.get(number, number)} "
-        f"{_PERCENT * (volumes[labels == number].sum() / volume - 1.0):+.1f} %"
+        f"{volumes[labels == number].sum() / volume - 1.0:+.1%}"
         for number, volume in zip(numbers.tolist(), before.tolist(), strict=True)
     ]
     note = "labels are those of the old tetrahedra in the same places; volumes of them changed by "
