@@ -14,13 +14,13 @@ from .recording.columns import COLUMNS as COLUMNS
 from .recording.columns import ColumnGroup as ColumnGroup
 from .recording.columns import FrameData as FrameData
 from .recording.observations import OBSERVATIONS as OBSERVATIONS
+from .scene.arm_tables import GrasperTable as GrasperTable
+from .scene.arm_tables import WaypointTable as WaypointTable
 from .scene.blade import SCALPEL as SCALPEL
 from .scene.read import SCENES as SCENES
 from .scene.read import read_scene as read_scene
 from .scene.scene import Scene as Scene
 from .scene.scene import changed as changed
-from .scene.schema import GrasperTable as GrasperTable
-from .scene.schema import WaypointTable as WaypointTable
 from .simulation import Simulation as Simulation
 from .state import SimulationState as SimulationState
 from .strokes.kind import LyingBody as LyingBody

@@ -30,9 +30,9 @@ from scalpel_sim.instruments.own_arm import (
     own_arm,
 )
 from scalpel_sim.instruments.scene_graspers import arms_with_graspers
+from scalpel_sim.scene.arm_tables import ArmTable, GrasperTable
 from scalpel_sim.scene.blade import SCALPEL
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.schema import ArmTable, GrasperTable
 from scalpel_sim.strokes.expected_force import ExpectedForce
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.sequence import lengthened

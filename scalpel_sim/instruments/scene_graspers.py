@@ -51,7 +51,7 @@ from scalpel_sim.instruments.own_arm import (
     move_within,
     own_spec,
 )
-from scalpel_sim.scene.schema import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
+from scalpel_sim.scene.arm_tables import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint, grasp_from_csv
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray

@@ -20,8 +20,8 @@ from scalpel_sim.instruments.scene_arms import (
 )
 from scalpel_sim.instruments.scene_graspers import grip_settings, motions_of
 from scalpel_sim.preparation.tissue import highest_toughness, make_tissue, tabletop_of
+from scalpel_sim.scene.arm_tables import GrasperTable
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.schema import GrasperTable
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.grasp_motion import GraspMotion

@@ -12,15 +12,13 @@ import numpy as np
 
 from bridge import VirtualCoupling
 from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.arm_tables import ArmTable, GrasperTable, WaypointTable
 from scalpel_sim.scene.schema import (
-    ArmTable,
     AttachmentTable,
-    GrasperTable,
     LabelTable,
     LedSupportTable,
     SolverTable,
     ViewTable,
-    WaypointTable,
     WorldTable,
 )
 from tissue import ELEMENTS, PRECISIONS, RELAXATIONS, SCHEMES, Material

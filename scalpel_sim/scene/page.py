@@ -10,10 +10,10 @@ from pathlib import Path
 
 import msgspec
 
+from scalpel_sim.scene.arm_tables import WaypointTable
 from scalpel_sim.scene.body import BodyTable, OneOfBodiesTable
 from scalpel_sim.scene.case import CaseContent
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.schema import WaypointTable
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.tables.key_texts import has_usual, texts_of, usual_text
 from scalpel_sim.tables.problems import as_toml, kinds_of, row_table_of, table_of

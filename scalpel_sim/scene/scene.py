@@ -10,6 +10,7 @@ from msgspec import field, structs
 
 from bridge import VirtualCoupling
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.arm_tables import ArmTable, GrasperTable
 from scalpel_sim.scene.blade import blade_of, table_of_blade
 from scalpel_sim.scene.body import (
     Bodies,
@@ -37,11 +38,9 @@ from scalpel_sim.scene.interfaces import InterfaceTable, check_interfaces, expec
 from scalpel_sim.scene.labels import full_name, labelled
 from scalpel_sim.scene.materials import given_in, material_in, material_of, naming_table
 from scalpel_sim.scene.schema import (
-    ArmTable,
     AttachmentTable,
     BladeTable,
     CoreTable,
-    GrasperTable,
     LabelTable,
     LedSupportTable,
     PresetMaterialTable,

@@ -23,7 +23,7 @@ from scalpel_sim.instruments.scene_graspers import (
     place_of_grasper,
     preset_with_grasper,
 )
-from scalpel_sim.scene.schema import GrasperTable
+from scalpel_sim.scene.arm_tables import GrasperTable
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
 from tests.support.planned_strokes import plan_stroke
 from tissue import Tissue, block
