@@ -68,7 +68,9 @@ def prepare(
     body, tissue = link.snapshot(), link.describe()
     mesh, bounds = TetrahedralMesh(body.positions, body.tetrahedra), tissue.bounds
     table = tabletop_of(scene, bounds)
-    stroke = stroke_through(mesh, scene.strokes, tissue.material, scene.world.stop)
+    stroke = stroke_through(
+        mesh, scene.strokes, tissue.material, scene.world.stop, body.rest_positions
+    )
     if not stroke.is_led:
         check_meets(stroke, mesh)
     motions = motions_of(scene.graspers)

@@ -112,9 +112,9 @@ def _led(
     legs = [(np.zeros(1), points[:1], forwards[:1])]
     for (start, end), forward in zip(pairwise(points), forwards, strict=True):
         now, tip, before = (part[-1:] for part in legs[-1])
-        turn = _angle(before[0], forward)
+        turn = seconds_to_turn(before[0], forward)
         if turn > 0.0:
-            now = now + max(turn / _TURN_RATE, SAMPLE)
+            now = now + turn
             legs.append((now, tip, forward[None]))
         when, done = timed(float(np.linalg.norm(end - start)), speed)
         tips = start + done[1:, None] / done[-1] * (end - start)
@@ -151,6 +151,7 @@ def _interpolated(at: FloatArray, known: FloatArray, rows: FloatArray) -> FloatA
     return np.stack([np.interp(at, known, rows[:, k]) for k in range(3)], axis=1)
 
 
-def _angle(a: FloatArray, b: FloatArray) -> float:
-    """Return the angle between two vectors [rad]."""
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+def seconds_to_turn(a: FloatArray, b: FloatArray) -> float:
+    """Return the time in which a blade turns about its edge from one direction to another [s]."""
+    angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    return max(angle / _TURN_RATE, SAMPLE) if angle > 0.0 else 0.0

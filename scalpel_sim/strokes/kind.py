@@ -19,7 +19,7 @@ from scalpel_sim.tables.values import (
     TwoShares,
     one_of,
 )
-from tissue import Material, TetrahedralMesh
+from tissue import FloatArray, Material, TetrahedralMesh
 
 DEFAULT_SPEED = 0.06
 """Speed of an unhurried incision [m/s]."""
@@ -46,15 +46,16 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     speed: Positive | None = None
     """Speed of the tip between its ramps [m/s]; 0.06 without."""
     depth: Positive | None = None
-    """Depth to which it goes [m]; without, an incision goes 0.008 deep, and a press half as deep as
-    would cut."""
+    """Depth to which it goes [m]; without, an incision or a traced stroke goes 0.008 deep, and a
+    press half as deep as would cut."""
     along: TwoShares | None = None
     """Where an incision goes in and out, as shares of the body's length; [0.2, 0.73] without. In
     the other order it is drawn backwards."""
     points: RowsOfThree | None = None
-    """Where the tip goes [m]: two points or more, and one of a stab."""
+    """Where the tip goes [m]: two points or more, and one of a stab. Of a traced stroke, near the
+    skin of the body at rest: the tip goes beneath them."""
     length: Positive | None = None
-    """Length of the blade [m]."""
+    """Length of the blade [m]; of a traced stroke three depths without, and 0.01 above the skin."""
     edge: ThreeNumbers | None = None
     """Direction from tip to heel; [0, 0, 1] without: the tip is down."""
     forward: ThreeNumbers | None = None
@@ -114,6 +115,8 @@ class LyingBody(NamedTuple):
     lowest: float = -math.inf
     """Height below which no planned stroke leads the edge [m]: the upper side of a table or a floor
     that stops it. An incision does not come near it."""
+    rest: FloatArray | None = None
+    """Positions of its nodes at rest [m], shape (n_nodes, 3); None: it lies at rest."""
 
 
 def no_problem(row: StrokeTable) -> None:

@@ -10,7 +10,7 @@ from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.problems import check_keys
-from tissue import Material, TetrahedralMesh
+from tissue import FloatArray, Material, TetrahedralMesh
 
 FASTEST_STROKE = 1.0
 """Highest speed of a stroke [m/s]: no surgeon cuts as fast."""
@@ -21,6 +21,7 @@ def stroke_through(
     strokes: Sequence[StrokeTable],
     material: Material = Material(),
     lowest: float = -math.inf,
+    rest: FloatArray | None = None,
 ) -> Stroke:
     """Return the path of the blade that does the strokes of a scene in turn.
 
@@ -29,12 +30,13 @@ def stroke_through(
         strokes: Rows of the scene, which `check_strokes` has passed.
         material: Material of the body.
         lowest: Height below which no planned stroke leads the edge [m]; see `LyingBody`.
+        rest: Positions of its nodes at rest [m]; None: it lies at rest.
 
     Raises:
         StrokeError: a speed or a depth is not positive, no blade can follow it, or the body has no
             section where it is planned.
     """
-    body = LyingBody(mesh, material, lowest)
+    body = LyingBody(mesh, material, lowest, rest)
     for row in strokes:
         check_positive("speed", row.speed, "m/s")
         check_positive("depth", row.depth, "m")

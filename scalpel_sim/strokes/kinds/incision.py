@@ -15,7 +15,7 @@ from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.kind import LyingBody, StrokeTable, stroke_kind
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import timed
-from tissue import BladeSegment, FloatArray, TetrahedralMesh, boundary_faces
+from tissue import BladeSegment, FloatArray, Material, TetrahedralMesh, boundary_faces
 
 DEPTH, DEPTH_SHARE = 8e-3, 0.3
 """Depth of an incision that is planned by itself: [m], or a share of the body's height where that
@@ -74,7 +74,7 @@ def incision(row: StrokeTable, body: LyingBody) -> Stroke:
         StrokeError: the body's upper side has a gap there, or the tip goes in and out at one place.
     """
     mesh, depth = body.mesh, row.depth
-    drag = DRAG_SHARE * body.material.toughness / body.material.young_modulus
+    drag = drag_of(body.material)
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     extent = high - low
     axis = 0 if extent[0] >= extent[1] else 1
@@ -86,7 +86,7 @@ def incision(row: StrokeTable, body: LyingBody) -> Stroke:
         )
     way = math.copysign(1.0, withdrawn_at - inserted_at)
     if depth is None:
-        depth = min(DEPTH, DEPTH_SHARE * float(extent[2]))
+        depth = usual_depth(mesh)
     ahead, up = way * np.eye(3)[axis], np.eye(3)[2]
     drawn_to = _drawn_to(withdrawn_at, way, drag / float(extent[axis]))
     at = low[axis] + np.linspace(inserted_at, drawn_to, _POINTS) * extent[axis]
@@ -103,6 +103,16 @@ def incision(row: StrokeTable, body: LyingBody) -> Stroke:
     asked_end = low[axis] + withdrawn_at * extent[axis]
     asked_until = float(np.interp(way * asked_end, way * tips[:, axis], times))
     return Stroke(times, poses, row.kind, asked=[(0.0, asked_until)])
+
+
+def drag_of(material: Material) -> float:
+    """Return how far the edge runs ahead of the material that it cuts [m]."""
+    return DRAG_SHARE * material.toughness / material.young_modulus
+
+
+def usual_depth(mesh: TetrahedralMesh) -> float:
+    """Return the depth of an incision into a body where none is given [m]."""
+    return min(DEPTH, DEPTH_SHARE * float(np.ptp(mesh.positions[:, 2])))
 
 
 def _drawn_to(withdrawn_at: float, way: float, drag: float) -> float:

@@ -1,0 +1,136 @@
+"""A cut along a line on the skin: the tip follows it at one depth, and the edge turns with it.
+
+heel |          | |          the edge stands along the depth, and what it sweeps is the line
+     |    __----+-+----      on the skin, drawn out to the depth
+-----+----      | |    ----- skin
+ tip |    __----+-+----
+     +----                   depth
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.strokes.drawn import edge_direction, missing_points, seconds_to_turn
+from scalpel_sim.strokes.kind import LyingBody, StrokeTable, stroke_kind
+from scalpel_sim.strokes.kinds.incision import drag_of, usual_depth
+from scalpel_sim.strokes.skin import BodySkin
+from scalpel_sim.strokes.skin_line import lines_on_skin
+from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.timing import timed
+from tissue import BladeSegment, FloatArray
+
+_TURN_OVER = 1.5e-3
+"""Half the length of line over which the edge turns where it passes a bend [m]."""
+
+_GAP = 4e-3
+"""Height above the skin at which the tip starts, and ends [m]: as that of an incision."""
+
+_REACH, _LEAST_REACH = 3.0, 0.01
+"""Length of the blade in depths, and at least above the skin [m]: tissue beside the edge rises."""
+
+
+class _Leg(NamedTuple):
+    """A part of the way that the tip goes without a stop."""
+
+    tips: FloatArray
+    """Where it goes [m], shape (n, 3)."""
+    forwards: FloatArray
+    """Direction of the cut there, shape (n, 3)."""
+
+    @property
+    def along(self) -> FloatArray:
+        """Length of the way to each place [m], shape (n,)."""
+        return np.append(0.0, np.linalg.norm(np.diff(self.tips, axis=0), axis=1).cumsum())
+
+    @property
+    def length(self) -> float:
+        """Length of the whole way [m]."""
+        return float(self.along[-1])
+
+
+@stroke_kind(
+    "a cut along a line on the skin: the tip goes in along the edge at the first point, follows "
+    "the line at one depth while the edge turns with it, and is drawn out at the last",
+    ("points",),
+    ("depth", "edge", "length", "speed"),
+    problem=missing_points,
+)
+def traced(row: StrokeTable, body: LyingBody) -> Stroke:
+    """Return a cut along a line on the skin.
+
+    The points are places at rest, as in the mesh: so they mean the same material however the body
+    lies. They are moved onto the skin along the edge, and so is the straight line between them.
+
+    Raises:
+        StrokeError: a point or the line between two misses the skin, or the skin is too steep.
+    """
+    edge = edge_direction(row)
+    depth = usual_depth(body.mesh) if row.depth is None else row.depth
+    skin = BodySkin.of(body.mesh, body.rest)
+    rise = (depth + _GAP) * edge
+    legs = [_leg(line - depth * edge) for line in lines_on_skin(np.array(row.points), skin, edge)]
+    drag = drag_of(body.material)
+    first, last = legs[0], _drawn_on(legs[-1], drag)
+    into = _Leg(np.stack([first.tips[0] + rise, first.tips[0]]), first.forwards[[0, 0]])
+    out = _Leg(np.stack([last.tips[-1], last.tips[-1] + rise]), last.forwards[[-1, -1]])
+    times, tips, forwards = _followed([into, *legs[:-1], last, out], row.tip_speed)
+    length = max(_REACH * depth, depth + _LEAST_REACH) if row.length is None else row.length
+    poses = [
+        BladeSegment(tip, tip + length * edge, forward)
+        for tip, forward in zip(tips, forwards, strict=True)
+    ]
+    drawn, done = timed(last.length, row.tip_speed)
+    way_out, _ = timed(out.length, row.tip_speed)
+    drawn_on = drawn[-1] - np.interp(last.length - drag, done, drawn)
+    asked_until = float(times[-1] - way_out[-1] - drawn_on)
+    return Stroke(times, poses, row.kind, asked=[(0.0, asked_until)])
+
+
+def _leg(line: FloatArray) -> _Leg:
+    """Return the way of the tip along a line, with the direction of the cut at each place.
+
+    Where the line bends, the edge turns over `_TURN_OVER` before and after.
+    """
+    along = np.append(0.0, np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum())
+    ends = (np.clip(along + shift, 0.0, along[-1]) for shift in (_TURN_OVER, -_TURN_OVER))
+    ahead, behind = (
+        np.stack([np.interp(at, along, line[:, k]) for k in range(3)], axis=1) for at in ends
+    )
+    forwards = ahead - behind
+    return _Leg(line, forwards / np.linalg.norm(forwards, axis=1)[:, None])
+
+
+def _drawn_on(leg: _Leg, farther: float) -> _Leg:
+    """Return a leg whose tip goes on beyond its end, straight ahead [m]."""
+    end, ahead = leg.tips[-1], leg.forwards[-1]
+    return _Leg(np.vstack([leg.tips, end + farther * ahead]), np.vstack([leg.forwards, ahead]))
+
+
+def _followed(legs: list[_Leg], speed: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times [s], places of the tip [m] and directions of the cut along legs.
+
+    Between legs the tip rests, and the blade turns.
+
+    Args:
+        legs: Each begins where the one before it ends.
+        speed: Speed between the ramps [m/s].
+    """
+    times, tips, forwards = [np.zeros(1)], [legs[0].tips[:1]], [legs[0].forwards[:1]]
+    for leg in legs:
+        now, turn = times[-1][-1:], seconds_to_turn(forwards[-1][-1], leg.forwards[0])
+        if turn > 0.0:
+            now = now + turn
+            times, tips, forwards = (
+                [*times, now],
+                [*tips, leg.tips[:1]],
+                [*forwards, leg.forwards[:1]],
+            )
+        along = leg.along
+        when, done = timed(leg.length, speed)
+        times.append(now + when[1:])
+        for rows, known in ((tips, leg.tips), (forwards, leg.forwards)):
+            rows.append(
+                np.stack([np.interp(done[1:], along, known[:, k]) for k in range(3)], axis=1)
+            )
+    return np.concatenate(times), np.concatenate(tips), np.concatenate(forwards)
