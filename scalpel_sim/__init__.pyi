@@ -14,6 +14,9 @@ from .recording.columns import COLUMNS as COLUMNS
 from .recording.columns import ColumnGroup as ColumnGroup
 from .recording.columns import FrameData as FrameData
 from .recording.observations import OBSERVATIONS as OBSERVATIONS
+from .saved_run.recorder import RunRecorder as RunRecorder
+from .saved_run.saved_run import SavedRun as SavedRun
+from .saved_run.saved_step import SavedStep as SavedStep
 from .scene.arm_tables import GrasperTable as GrasperTable
 from .scene.arm_tables import WaypointTable as WaypointTable
 from .scene.blade import SCALPEL as SCALPEL
@@ -41,11 +44,14 @@ __all__ = [
     "Instrument",
     "OBSERVATIONS",
     "LyingBody",
+    "RunRecorder",
     "SCALPEL",
     "FlexBody",
     "FlexError",
     "SCENES",
     "STROKES",
+    "SavedRun",
+    "SavedStep",
     "Scene",
     "Simulation",
     "SimulationState",

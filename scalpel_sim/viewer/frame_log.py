@@ -2,14 +2,14 @@
 
 import struct
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import msgspec
-import numpy as np
 
 from scalpel_sim.recording.growing_file import FileSum
 from scalpel_sim.recording.recording import unnamed_file
 from scalpel_sim.viewer.messages import SceneState
+from scalpel_sim.viewer.packing import array_of, pack
 
 _HEAD = struct.Struct("<dqq")
 """Time [s], number of triangles, and length of what follows [bytes]."""
@@ -56,7 +56,7 @@ class FrameLog:
         Raises:
             OSError: the file cannot be written.
         """
-        content = _encoder.encode(state)
+        content = pack(state)
         n_triangles = len(state.surface.triangles)
         data = _HEAD.pack(time, n_triangles, len(content)) + content
         begin = self.sum.n_bytes + _HEAD.size
@@ -98,20 +98,4 @@ class FrameLog:
         self.close()
 
 
-def _plain(value: Any) -> Any:
-    """Return an array in a form that can be written: type, shape, and numbers."""
-    if isinstance(value, np.ndarray):
-        return value.dtype.str, value.shape, np.ascontiguousarray(value).data
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(f"a frame of a replay holds a {type(value).__name__}")
-
-
-def _array(kind: type, plain: Any) -> np.ndarray:
-    """Return the array that was written."""
-    dtype, shape, numbers = plain
-    return np.frombuffer(numbers, dtype).reshape(shape)
-
-
-_encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
-_decoder = msgspec.msgpack.Decoder(SceneState, dec_hook=_array)
+_decoder = msgspec.msgpack.Decoder(SceneState, dec_hook=array_of)
