@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scalpel_sim.errors import writing
-from scalpel_sim.saved_run.laid_out_file import TIMES, Describe, GrowingTable, LaidOutFile
+from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, Describe, GrowingTable, LaidOutFile
 from tissue.support import remove_unfinished, whole_file
 
 _INSTEAD = "another --record"
@@ -25,7 +25,7 @@ class GrowingTables:
 
     Args:
         path: The file; one that is there is replaced by the first step.
-        tables: The tables; `TIMES` is one of them.
+        tables: The tables; `STEP_TIMES` is one of them.
         describe: Writes what does not grow.
 
     Raises:
@@ -50,7 +50,7 @@ class GrowingTables:
     @property
     def n_steps(self) -> int:
         """Number of steps."""
-        return self._lengths[TIMES]
+        return self._lengths[STEP_TIMES]
 
     def has(self, name: str) -> bool:
         """Return whether there is a table of that name."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # loading it takes 0.15 s, and most runs are not recorded
 STEPS = "VTKHDF/Steps"
 """Group of the steps, whose attribute `NSteps` is their number, as VTKHDF has it."""
 
-TIMES = f"{STEPS}/Values"
+STEP_TIMES = f"{STEPS}/Values"
 """Table of their times. Its length is `NSteps`: VTK takes all of it."""
 
 _PAGE = 4096
@@ -87,7 +87,7 @@ class LaidOutFile:
 
     Args:
         path: The file, which is replaced.
-        tables: The tables with their room; `TIMES` is one of them.
+        tables: The tables with their room; `STEP_TIMES` is one of them.
         describe: Writes what does not grow.
 
     Raises:
@@ -101,11 +101,11 @@ class LaidOutFile:
         self.path = path
         self._tables = {table.name: table for table in tables}
         self._shown = dict.fromkeys(self._tables, -1)
-        times = self._tables[TIMES]
+        times = self._tables[STEP_TIMES]
         # The form of before 1.8 has no checksums, and no mark of a file that is open.
         with h5py.File(path, "w", libver=("earliest", "v108")) as file:
             file.create_group(STEPS).attrs.create("NSteps", np.frombuffer(_MARKER, "<i8")[0])
-            found = {TIMES: _new_table(file, times)}  # next to the number: in one page with it
+            found = {STEP_TIMES: _new_table(file, times)}  # next to the number: in one page with it
             for table in self._tables.values():
                 if table is not times:
                     found[table.name] = _new_table(file, table)
@@ -116,7 +116,7 @@ class LaidOutFile:
             for name, (data, header) in found.items()
         }
         self._counter = self._read(0, _HEAD).find(_MARKER)
-        shape = self._places[TIMES].shape
+        shape = self._places[STEP_TIMES].shape
         self._page_begin = min(self._counter, shape)
         end = max(self._counter + 8, shape + 16)
         if self._counter < 0 or self._page_begin // _PAGE != (end - 1) // _PAGE:
@@ -167,21 +167,21 @@ class LaidOutFile:
                     place, left = place + len(content), left - len(content)
 
     def show(self, lengths: Mapping[str, int]) -> None:
-        """Show so many rows of each table to readers, and as many steps as `TIMES` has rows.
+        """Show so many rows of each table to readers, and as many steps as `STEP_TIMES` has rows.
 
         A step is seen after the rows that it has, and not any more before they go.
         """
-        are_fewer = lengths[TIMES] < self._shown[TIMES]
+        are_fewer = lengths[STEP_TIMES] < self._shown[STEP_TIMES]
         if are_fewer:
-            self._show_steps(lengths[TIMES])
+            self._show_steps(lengths[STEP_TIMES])
         for name, length in lengths.items():
-            if name != TIMES and length != self._shown[name]:
+            if name != STEP_TIMES and length != self._shown[name]:
                 shape = (length, *self._tables[name].width)
                 self._write(
                     self._places[name].shape, struct.pack(f"<{2 * len(shape)}q", *shape, *shape)
                 )
         if not are_fewer:
-            self._show_steps(lengths[TIMES])
+            self._show_steps(lengths[STEP_TIMES])
         self._shown = dict(lengths)
 
     def close(self) -> None:
@@ -191,7 +191,7 @@ class LaidOutFile:
     def _show_steps(self, n: int) -> None:
         """Write the number of steps and the length of the table of times, at once."""
         struct.pack_into("<q", self._page, self._counter - self._page_begin, n)
-        struct.pack_into("<qq", self._page, self._places[TIMES].shape - self._page_begin, n, n)
+        struct.pack_into("<qq", self._page, self._places[STEP_TIMES].shape - self._page_begin, n, n)
         self._write(self._page_begin, bytes(self._page))
 
     def _place_of_shape(self, header: int) -> int:

@@ -10,7 +10,7 @@ rows of `forces.csv`, and the scene; VTK passes over it.
 
 from typing import NamedTuple
 
-from scalpel_sim.saved_run.laid_out_file import STEPS, TIMES, GrowingTable
+from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, STEPS, GrowingTable
 from tissue import Energies
 
 VTK = "VTKHDF"
@@ -166,7 +166,7 @@ def tables_of(sizes: Sizes) -> tuple[GrowingTable, ...]:
     fields = [("PointData", each, points) for each in POINT_FIELDS]
     fields += [("CellData", each, cells) for each in CELL_FIELDS]
     found = [
-        GrowingTable(TIMES, "f8", (), n),
+        GrowingTable(STEP_TIMES, "f8", (), n),
         *(GrowingTable(each, "i8", (), n) for each in (PART_OFFSETS, N_PARTS, POINT_OFFSETS)),
         *(GrowingTable(each, "i8", (1,), n) for each in (CELL_OFFSETS, CONNECTIVITY_OFFSETS)),
         *(GrowingTable(f"{VTK}/{each}", "i8", (), n) for each in COUNTS),

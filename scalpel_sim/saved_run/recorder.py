@@ -13,7 +13,7 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.saved_run.body_writer import BodyWriter
 from scalpel_sim.saved_run.growing_tables import GrowingTables
 from scalpel_sim.saved_run.instant import contact_rows, poses_and_forces
-from scalpel_sim.saved_run.laid_out_file import TIMES
+from scalpel_sim.saved_run.laid_out_file import STEP_TIMES
 from scalpel_sim.saved_run.layout import (
     CONTACTS,
     ENDS,
@@ -170,7 +170,7 @@ class RunRecorder:
         for name, row in own.items():
             if file.has(f"{OWN}/{name}"):
                 file.append(f"{OWN}/{name}", row)
-        file.append(TIMES, time)
+        file.append(STEP_TIMES, time)
         lengths = (*file.lengths[:-1], file.length(ENDS) + 1)
         file.append(ENDS, lengths)
         file.commit()

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from bridge import TissueFrame
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.saved_run.laid_out_file import TIMES
+from scalpel_sim.saved_run.laid_out_file import STEP_TIMES
 from scalpel_sim.saved_run.layout import (
     CONNECTIVITY,
     CONNECTIVITY_OFFSETS,
@@ -101,7 +101,7 @@ class SavedRun:
                 f"{self.path}: is a recording of another version of the program (form {form}, and "
                 f"this one reads {FORM})"
             )
-        self.times: FloatArray = self._file[TIMES][:]
+        self.times: FloatArray = self._file[STEP_TIMES][:]
         """Times of the steps [s]."""
         self.dt = float(own.attrs["dt"])
         """Length of a frame of the simulation [s]."""
