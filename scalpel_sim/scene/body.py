@@ -57,7 +57,7 @@ class BodyTable(TomlTable, kw_only=True, frozen=True, dict=True):
 
     shape: Annotated[BodyShape, one_of(*_SHAPES)]
     """`"organ"`, a liver lobe of 5,136 tetrahedra; `"gallbladder"`, one on its bed of liver, with
-    fat and artery as labels, 4,819 tetrahedra; `"block"`; `"lattice"`, a block with a node in
+    fat and artery as labels, 4,852 tetrahedra; `"block"`; `"lattice"`, a block with a node in
     each cell too, for what is bent ([materials](materials.md#the-laws)); `"graded"`, a block of
     cells of different sizes; `"cylinder"`; or `"mesh"`, a file."""
     size: Size | None = None

@@ -4,11 +4,11 @@ The isosurface stuffing of `tissue.shapes.isosurface_stuffing`, of more than two
 two meet in a lattice tetrahedron its stencils are taken on both sides; where three or four do, a
 point inside it is joined with what the faces show of them, and a point inside a face with its
 edges. What lies in a face follows from the face alone, so that neighbours agree on it and no gap is
-left.
+left. Then nodes where three labels or more meet, one of them the outside, are moved to where they
+meet.
 """
 
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -28,11 +28,8 @@ from tissue.shapes.isosurface_stuffing import (
     stencil,
     turned_left_and_used,
 )
+from tissue.shapes.label_borders import DepthFunction, moved_to_borders
 from tissue.types import TetrahedralMesh
-
-DepthFunction = Callable[[FloatArray, IntArray], FloatArray]
-"""Points [m], shape (n, 3), and a label for each, to how deep each is in the shape of that label,
-shape (n,). A point belongs to the label with the largest; label 0 is what is outside of all."""
 
 ON_SURFACE = -1
 """Label of a lattice point that was moved onto a surface."""
@@ -70,7 +67,8 @@ def stuff_labels(
     cuts = bisected(lambda at: depth(at, a) - depth(at, b), inner, outer)
     moved = _moved(lattice.points, tetrahedra, labels, edges, cuts)
     nodes = _Nodes(moved.points, edges[moved.is_cut], cuts[moved.is_cut])
-    return _divided(nodes, tetrahedra, moved.signs)
+    mesh = _divided(nodes, tetrahedra, moved.signs)
+    return mesh._replace(positions=moved_to_borders(mesh, depth, spacing))
 
 
 def _labels_at(depth: DepthFunction, n_labels: int, points: FloatArray) -> IntArray:

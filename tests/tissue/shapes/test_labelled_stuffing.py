@@ -104,3 +104,16 @@ def test_no_tetrahedron_is_flat_where_a_surface_lies_in_the_lattice():
 def test_shapes_that_do_not_fit_are_refused(bounds, spacing, said):
     with pytest.raises(ValueError, match=said):
         stuff_labels(nearest_of(random_centres(0)), 5, bounds, spacing)
+
+
+def test_where_a_border_ends_in_the_skin_no_tooth_of_a_label_is_left():
+    """Nodes of both labels and the skin are where the plane between them leaves the two balls."""
+    centres = np.array([[0.0, 0.0, 0.0131], [0.0, 0.0, -0.007]])
+    mesh = divided_ball(centres, spacing=0.006)
+    labels, rim = mesh.labels, np.unique(skin(mesh))
+    both = set(mesh.tetrahedra[labels == 1].ravel()) & set(mesh.tetrahedra[labels == 2].ravel())
+    rim = [n for n in rim if n in both]
+    assert len(rim) > 20
+    np.testing.assert_allclose(mesh.positions[rim, 2], 0.00305, atol=0.02 * 0.006)
+    ways = np.linalg.norm(mesh.positions[rim] - centres[0], axis=1)
+    np.testing.assert_allclose(ways, RADIUS, atol=0.02 * 0.006)
