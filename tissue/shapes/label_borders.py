@@ -14,28 +14,28 @@ DepthFunction = Callable[[FloatArray, IntArray], FloatArray]
 """Points [m], shape (n, 3), and a label for each, to how deep each is in the shape of that label,
 shape (n,). A point belongs to the label with the largest; label 0 is what is outside of all."""
 
-LEAST_MEETING = 3
+_LEAST_MEETING = 3
 """Number of labels, with the outside, from which on a node is moved: where two meet, nodes are on
 the border already."""
 
-STEPS = 12
+_STEPS = 12
 """Number of Newton's steps to the border. Each is short where borders bend within a cell."""
 
-LONGEST_STEP = 0.3
+_LONGEST_STEP = 0.3
 """Longest step, as a share of the spacing: farther away a border looks otherwise."""
 
-DIFFERENCE = 1e-4
+_DIFFERENCE = 1e-4
 """Step of the differences that give slopes of depths, as a share of the spacing."""
 
-FLATTEST = 1e-3
+_FLATTEST = 1e-3
 """Slope across which two borders count as one, as a share of the steepest: there a node moves
 onto the border and not along it."""
 
-KEPT_QUALITY = 0.15
+_KEPT_QUALITY = 0.15
 """Quality that the tetrahedra around a moved node keep, if they had it: about the least that
 stuffing one shape leaves."""
 
-HALVINGS = 4
+_HALVINGS = 4
 """Number of times that a way is halved before its node stays where it is."""
 
 
@@ -52,7 +52,7 @@ def moved_to_borders(mesh: TetrahedralMesh, depth: DepthFunction, spacing: float
         spacing: Edge of a lattice cell [m].
     """
     meeting = _labels_at_nodes(mesh)
-    chosen = np.flatnonzero(meeting.sum(axis=1) >= LEAST_MEETING)
+    chosen = np.flatnonzero(meeting.sum(axis=1) >= _LEAST_MEETING)
     if not len(chosen):
         return mesh.positions
     way = np.zeros_like(mesh.positions)
@@ -87,27 +87,27 @@ def _onto_borders(
         mean = np.sum(depths, axis=1, where=meeting) / meeting.sum(axis=1)
         return np.where(meeting, depths - mean[:, None], 0.0)
 
-    aside = DIFFERENCE * spacing * np.eye(3)
-    for _ in range(STEPS):
+    aside = _DIFFERENCE * spacing * np.eye(3)
+    for _ in range(_STEPS):
         slopes = np.stack(
             [(uneven(points + h) - uneven(points - h)) / (2.0 * np.linalg.norm(h)) for h in aside],
             axis=2,
         )
-        inverse = np.linalg.pinv(slopes, rcond=FLATTEST)
+        inverse = np.linalg.pinv(slopes, rcond=_FLATTEST)
         step = -np.einsum("nij,nj->ni", inverse, uneven(points))
         length = np.linalg.norm(step, axis=1, keepdims=True)
-        points = points + step * np.minimum(1.0, LONGEST_STEP * spacing / np.maximum(length, 1e-30))
+        points = points + step * np.minimum(1.0, _LONGEST_STEP * spacing / np.maximum(length, 1e-30))
     return points
 
 
 def _as_far_as_kept(mesh: TetrahedralMesh, way: FloatArray) -> FloatArray:
     """Return the positions moved along ways [m], each so far that its tetrahedra stay good."""
     tetrahedra = mesh.tetrahedra
-    least = np.minimum(quality(mesh.positions, tetrahedra), KEPT_QUALITY)
+    least = np.minimum(quality(mesh.positions, tetrahedra), _KEPT_QUALITY)
     for n_halvings in itertools.count():
         positions = mesh.positions + way
         is_worse = quality(positions, tetrahedra) < least
         if not is_worse.any():
             return positions
-        way[np.unique(tetrahedra[is_worse])] *= 0.5 if n_halvings < HALVINGS else 0.0
+        way[np.unique(tetrahedra[is_worse])] *= 0.5 if n_halvings < _HALVINGS else 0.0
     raise AssertionError("unreachable: where no node moves, none is worse")
