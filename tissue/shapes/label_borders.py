@@ -96,7 +96,9 @@ def _onto_borders(
         inverse = np.linalg.pinv(slopes, rcond=_FLATTEST)
         step = -np.einsum("nij,nj->ni", inverse, uneven(points))
         length = np.linalg.norm(step, axis=1, keepdims=True)
-        points = points + step * np.minimum(1.0, _LONGEST_STEP * spacing / np.maximum(length, 1e-30))
+        points = points + step * np.minimum(
+            1.0, _LONGEST_STEP * spacing / np.maximum(length, 1e-30)
+        )
     return points
 
 
