@@ -58,6 +58,7 @@ from .material_presets import DAMPING_BAND as DAMPING_BAND
 from .material_presets import MATERIALS as MATERIALS
 from .material_presets import Preset as Preset
 from .material_presets import SourcedValue as SourcedValue
+from .mesh.cut_faces import CutFaces as CutFaces
 from .mesh.faces import boundary_faces as boundary_faces
 from .mesh.joined import joined as joined
 from .mesh.joined import placed as placed
@@ -106,6 +107,7 @@ __all__ = [
     "Chunks",
     "CoreCutError",
     "CoreMotion",
+    "CutFaces",
     "CutReport",
     "CutSettings",
     "DAMPING_BAND",

@@ -10,7 +10,11 @@ import numpy.typing as npt
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.elasticity.internal_forces import Elastic
 from tissue.fields.node_fields import largest_principal_strains, von_mises_stresses
-from tissue.fields.tetrahedron_fields import strains_of_tetrahedra, stresses_of_tetrahedra
+from tissue.fields.tetrahedron_fields import (
+    principal_strains,
+    strains_of_tetrahedra,
+    stresses_of_tetrahedra,
+)
 from tissue.integrators.model import TissueModel
 from tissue.loads.facing import Facing, facing_points
 from tissue.loads.material_points import MaterialPoints, points_of, region_mask
@@ -18,6 +22,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.cut_faces import CutFaces
 from tissue.mesh.parts import labels_of_part
 from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.mesh.rigid_cores import CoreMotion
@@ -232,6 +237,34 @@ class BodyView:
     def positions_of(self, points: MaterialPoints) -> FloatArray:
         """Return where material points are now [m], shape (n, 3)."""
         return points.positions(self._body)
+
+    def strains_of(self, points: MaterialPoints) -> FloatArray:
+        """Return the largest principal Green-Lagrange strain at material points, shape (n,).
+
+        (l^2 - 1) / 2 where the most stretched direction is l times as long, in the tetrahedron that
+        holds the point now.
+        """
+        tetrahedra, strains = points.holders(self._body), np.empty(len(points))
+        principal_strains(self._body, tetrahedra, strains)
+        return strains
+
+    @property
+    def n_cut_faces(self) -> int:
+        """Number of faces that cuts have opened since the body was made."""
+        return len(self._model.cut_faces)
+
+    def cut_faces(self, since: int = 0) -> CutFaces:
+        """Return the faces that cuts have opened, one side of each, in order.
+
+        Their areas add up to `StepResult.cut_area`. A state has them too.
+
+        Args:
+            since: Number of the first of them: those before are known.
+
+        Raises:
+            ValueError: fewer faces were cut.
+        """
+        return self._model.cut_faces.since(since)
 
     def labels(self) -> IntArray:
         """Return the label of each tetrahedron now, shape (n_tets,): 0 of meshes without labels."""

@@ -14,6 +14,7 @@ from scalpel_sim.scene.arm_tables import WaypointTable
 from scalpel_sim.scene.body import BodyTable, OneOfBodiesTable
 from scalpel_sim.scene.case import CaseContent
 from scalpel_sim.scene.scene import Scene
+from scalpel_sim.scene.task_table import TaskTable
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.tables.key_texts import has_usual, texts_of, usual_text
 from scalpel_sim.tables.problems import as_toml, kinds_of, row_table_of, table_of
@@ -47,6 +48,10 @@ def _keys(name: str) -> str:
         tables |= {
             key: table_of(kind) or row_table_of(kind) for key, kind in kinds_of(root).items()
         }
+    tables |= {
+        f"task_{key}": table_of(kind) or row_table_of(kind)
+        for key, kind in kinds_of(TaskTable).items()
+    }
     tables["one_of_bodies"] = row_table_of(kinds_of(Scene)["body"])
     tables["case_blade"] = table_of(kinds_of(CaseContent)["blade"])
     tables["case_support"] = row_table_of(kinds_of(CaseContent)["support"])

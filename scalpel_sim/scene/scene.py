@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from msgspec import field, structs
+from msgspec import field, structs, to_builtins
 
 from bridge import VirtualCoupling
 from scalpel_sim.errors import UsageError
@@ -48,6 +48,7 @@ from scalpel_sim.scene.schema import (
     ViewTable,
     WorldTable,
 )
+from scalpel_sim.scene.task_table import TaskTable, check_task
 from scalpel_sim.strokes.kind import StrokeTable, stroke_called
 from scalpel_sim.strokes.scene_stroke import check_strokes
 from scalpel_sim.tables.values import NameOfScene, Positive, Text, TomlTable
@@ -106,6 +107,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """Strokes of the blade, in turn."""
     views: tuple[ViewTable, ...] = field(default=(), name="view")
     """Where pages and pictures show it from, the first of them at the start."""
+    task: TaskTable | None = None
+    """The task that a run is scored by; without, it has no score."""
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""
@@ -123,6 +126,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_rows("support", self.supports, check_support)
         check_rows("grasper", self.graspers, check_grasper)
         check_rows("view", self.views, check_view)
+        check_task(self.task, [each.name for each in self.graspers])
 
     @property
     def bodies(self) -> tuple[OneOfBodiesTable, ...]:
@@ -281,6 +285,7 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "own_arm": None if arm.model is None else own | _values(world, "pos", "quat"),
             "graspers": [given_in(grasper) for grasper in self.graspers],
             "views": [given_in(view) for view in self.views],
+            "task": None if self.task is None else to_builtins(self.task),
             **_values(arm, "tissue_every", "coupling", "coupling_stiffness", "coupling_damping"),
             "passivity": arm.passivity,
             "seconds": self.seconds,

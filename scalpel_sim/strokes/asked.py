@@ -74,7 +74,7 @@ def first_areas(stroke: Stroke, body: Snapshot, near: float) -> list[tuple[float
     """
     if stroke.asked is None:
         return None
-    passed = _PassedPlaces(near)
+    passed = PassedPlaces(near)
     found = []
     for start, end in stroke.asked:
         places, areas = _passed_between(stroke, start, end)
@@ -86,7 +86,7 @@ def first_areas(stroke: Stroke, body: Snapshot, near: float) -> list[tuple[float
     return found
 
 
-class _PassedPlaces:
+class PassedPlaces:
     """Which cells of a grid the edge has been near, and left.
 
     Args:

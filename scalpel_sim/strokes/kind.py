@@ -123,7 +123,7 @@ def no_problem(row: StrokeTable) -> None:
     """Find nothing wrong: the keys of the row are all that counts."""
 
 
-Plan = Callable[[StrokeTable, LyingBody], Stroke]
+StrokePlan = Callable[[StrokeTable, LyingBody], Stroke]
 """Returns the path of the blade from a row, whose keys are checked, and the body. It raises
 `StrokeError` where no blade can follow it, or the body has no section where it is planned."""
 
@@ -133,7 +133,7 @@ class StrokeKind(NamedTuple):
 
     keys: Kind
     """The keys that a row `[[stroke]]` of this kind needs and may have, and what it does."""
-    plan: Plan
+    plan: StrokePlan
     """Returns the path of the blade."""
     is_planned: bool = False
     """Whether the program places the stroke in the body; else the row says where it is [m]."""
@@ -152,7 +152,7 @@ STROKES: dict[str, StrokeKind] = {}
 
 def stroke_kind(
     about: str, needed: tuple[str, ...] = (), possible: tuple[str, ...] = (), **settings: Any
-) -> Callable[[Plan], Plan]:
+) -> Callable[[StrokePlan], StrokePlan]:
     """Return a decorator that adds a function to `STROKES`, as the plan of the kind of its name.
 
     Args:
@@ -162,7 +162,7 @@ def stroke_kind(
         settings: Other fields of `StrokeKind`.
     """
 
-    def added(plan: Plan) -> Plan:
+    def added(plan: StrokePlan) -> StrokePlan:
         STROKES[plan.__name__] = StrokeKind(Kind(about, needed, possible), plan, **settings)
         return plan
 

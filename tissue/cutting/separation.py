@@ -20,7 +20,7 @@ from tissue.cutting.cut_surface import (
 from tissue.cutting.workspace import Cut
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
 from tissue.mesh.body import CUT, Body, local_index
-from tissue.mesh.changes import LISTS, NODES, note_dirty
+from tissue.mesh.changes import NODES, note_dirty, note_face
 from tissue.mesh.star import star
 
 FRAGMENT_TETRAHEDRA = 16
@@ -104,17 +104,9 @@ def _mark_faces_of(cut: Cut, t: int) -> None:
             continue
         if _n_links(body, t) == 1 or _n_links(body, other) == 1:
             continue  # a tetrahedron keeps its last link: alone it would be a fragment
-        if change.n_faces == len(change.faces):
-            change.lacks_room = LISTS
-            return
         decide_side(surface, t, side)
         decide_side(surface, other, other_side)
-        row = change.n_faces
-        change.n_faces += 1
-        change.faces[row, 0] = t
-        change.faces[row, 1] = f
-        change.faces[row, 2] = other
-        change.faces[row, 3] = link % 4
+        note_face(change, t, f, other, link % 4)
         body.links[t, f] = CUT
         body.links[other, link % 4] = CUT
 

@@ -17,14 +17,14 @@ share of its pull; so the virials of all tetrahedra are those of all springs. Vi
 in it, nor is what keeps tetrahedra of springs from turning inside out.
 """
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, norm, sub, vec3
 from tissue.elasticity.finite_elements import corner_row
 from tissue.elasticity.internal_forces import Elastic, deform
 from tissue.elasticity.rest_shapes import rest_normals
 from tissue.elasticity.springs import NO_LENGTH
-from tissue.geometry.tetrahedron import Symmetric, tetrahedron_volume
+from tissue.geometry.tetrahedron import Symmetric, largest_eigenvalue, tetrahedron_volume
 from tissue.mesh.body import Body
 
 
@@ -42,6 +42,20 @@ def strains_of_tetrahedra(body: Body, strains: FloatArray) -> None:
         strains[t, 0, 1], strains[t, 1, 0] = e.xy, e.xy
         strains[t, 0, 2], strains[t, 2, 0] = e.xz, e.xz
         strains[t, 1, 2], strains[t, 2, 1] = e.yz, e.yz
+
+
+@kernel
+def principal_strains(body: Body, tetrahedra: IntArray, strains: FloatArray) -> None:
+    """Write the largest principal Green-Lagrange strain of some tetrahedra.
+
+    Args:
+        body: The body.
+        tetrahedra: Which, shape (n,).
+        strains: Written, shape (n,).
+    """
+    for i in range(len(tetrahedra)):
+        strain, _ = green_lagrange(body, tetrahedra[i])
+        strains[i] = largest_eigenvalue(strain)
 
 
 @kernel

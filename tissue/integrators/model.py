@@ -31,6 +31,7 @@ from tissue.integrators.stability import damping_rate, stable_step
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
+from tissue.mesh.cut_faces import CutFaceLog
 from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.node_means import write_node_means
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
@@ -100,6 +101,7 @@ class TissueModel:
             averages_shear=numerics.averages_shear,
             resists_collapse=numerics.moves_together,
         )
+        self.cut_faces = CutFaceLog()
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._write_node_means(np.arange(body.n_nodes))
         self.node_size = mean_node_size(body, self.visits, self._around)
@@ -281,7 +283,8 @@ class TissueModel:
             self.find_loose_pieces()
 
     def mesh_changed(self, changed: ChangedMesh) -> None:
-        """Find loose pieces again some increments later, and the friction of the nodes."""
+        """List new faces, and find loose pieces some increments later, and friction of nodes."""
+        self.cut_faces.add(self.body, changed.change)
         self._write_node_means(changed.nodes)
         if self.increments_to_pieces == 0:
             self.increments_to_pieces = INCREMENTS_TO_PIECES

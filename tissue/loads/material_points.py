@@ -33,11 +33,15 @@ class MaterialPoints:
     def __len__(self) -> int:
         return len(self.rest)
 
-    def nodes_and_weights(self, body: Body) -> tuple[IntArray, FloatArray]:
-        """Return the nodes around each point and their barycentric weights, shapes (n, 4)."""
+    def holders(self, body: Body) -> IntArray:
+        """Return the tetrahedron that holds each point now, shape (n,)."""
         # Cuts split tetrahedra and move nodes at rest: the points stay where they are.
         locate_points(body, self.rest, self._tetrahedra, self._weights)
-        return body.tetrahedra[self._tetrahedra], self._weights
+        return self._tetrahedra
+
+    def nodes_and_weights(self, body: Body) -> tuple[IntArray, FloatArray]:
+        """Return the nodes around each point and their barycentric weights, shapes (n, 4)."""
+        return body.tetrahedra[self.holders(body)], self._weights
 
     def repeated(self, n: int) -> "MaterialPoints":
         """Return these points; one point as often as that.

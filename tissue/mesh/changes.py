@@ -125,6 +125,28 @@ def note_dirty(change: Change, t: int) -> None:
 
 
 @kernel
+def note_face(change: Change, t: int, f: int, other: int, g: int) -> None:
+    """List a face as cut.
+
+    Args:
+        change: The list.
+        t: A tetrahedron that has it.
+        f: Its local number there.
+        other: The other tetrahedron.
+        g: Its local number there.
+    """
+    if change.n_faces == len(change.faces):
+        change.lacks_room = LISTS
+        return
+    row = change.n_faces
+    change.n_faces += 1
+    change.faces[row, 0] = t
+    change.faces[row, 1] = f
+    change.faces[row, 2] = other
+    change.faces[row, 3] = g
+
+
+@kernel
 def note_child(change: Change, child: int, parent: int) -> None:
     """List tetrahedron `child`, which was appended, as a part of `parent`."""
     if change.n_children == len(change.children):

@@ -13,7 +13,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.solver_settings import SolverSettings
 
-STATE_FORMAT = 11
+STATE_FORMAT = 12
 """Number of the form of a state in bytes. It rises where the form changes."""
 
 _FREE = ("solver.threads",)

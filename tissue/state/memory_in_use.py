@@ -63,6 +63,7 @@ _LISTS: Mapping[str, Mapping[str, str]] = {
         "order": "n_crossings",
     },
     "GeomSearch": {"touched": "n_touched"},
+    "FaceList": {"corners": "n", "area": "n", "labels": "n", "cause": "n", "time": "n"},
     "Collapsing": {"listed": "n"},
 }
 """Lists with their counts: what is behind their ends means nothing."""

@@ -129,6 +129,7 @@ class StepStages:
         edge = NOWHERE if sweep is None else edge_of(sweep)
         model, incision, handles = self.model, self.incision, self.handles
         n, travel = self._begin(sweep, edge, dt)
+        model.cut_faces.pass_time(dt)
         n_substeps = 0
         collision = topology = relaxation = 0.0  # wall times
         now = perf_counter()
@@ -161,11 +162,7 @@ class StepStages:
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
     def _begin(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> tuple[int, float]:
-        """Take the edge, start the totals of a step, and find where geoms may touch.
-
-        Returns:
-            Number of increments, and how far the edge moves [m].
-        """
+        """Take the edge, and begin a step; return its increments and how far the edge moves [m]."""
         model, has_blade, outcome = self.model, sweep is not None, BEGUN
         while True:
             frame = self.frame_now()
@@ -319,9 +316,11 @@ class StepStages:
         """
         self.end_incision()
         incision, blade_path = self.incision, self.incision.path
-        before = incision.cut_area
+        before, faces = incision.cut_area, self.model.cut_faces
+        faces.is_given = True
         cut_along(incision, self.hooks, rows, directions, self.model.node_size)
         self.end_incision()
+        faces.is_given = False
         incision.path = blade_path
         self._frame = None  # it may have the other path, and no struct was made for this one
         return incision.cut_area - before

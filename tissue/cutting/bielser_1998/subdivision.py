@@ -27,7 +27,7 @@ from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import CUT, OUTER, Body, relative_density
-from tissue.mesh.changes import Change, note_child, note_dirty
+from tissue.mesh.changes import Change, note_child, note_dirty, note_face
 from tissue.mesh.nonconforming import HANGING, join_list, leave_list
 
 MOST_NEW_NODES = 20
@@ -160,6 +160,7 @@ def _link_inside(s: Split, t: int, c: int, code: int) -> None:
             body.links[child, f] = CUT
             if link // 4 > c:
                 s.change.area += face_area(body.rest, body.tetrahedra, child, f)
+                note_face(s.change, child, f, child_of(s.records, t, link // 4), link % 4)
         else:
             body.links[child, f] = 4 * child_of(s.records, t, link // 4) + link % 4
 

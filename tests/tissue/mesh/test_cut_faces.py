@@ -1,0 +1,143 @@
+"""The list of cut faces: each area that a cut opens, once, in the body at rest."""
+
+import numpy as np
+import pytest
+
+from tests.support import bodies, strokes
+from tissue import BladeShape, Material, SolverSettings, Tissue, TissueState, block
+from tissue.blade.prescribed_cut import cut_along
+
+ROUNDING = 1e-9
+"""Relative difference of two sums of the same areas."""
+
+
+def held(mesh, **settings):
+    """Return a body between two sides, without gravity."""
+    fixed, free = bodies.sides(mesh), (0.0, 0.0, 0.0)
+    return Tissue(mesh, Material(), fixed=fixed, gravity=free, **settings)
+
+
+def areas_of(corners):
+    """Return the areas of triangles."""
+    sides = corners[:, 1:] - corners[:, :1]
+    return 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+
+
+@pytest.mark.parametrize("kind", strokes.THROUGH)
+def test_areas_add_up_to_the_area_that_was_cut(kind):
+    mesh = bodies.jittered(4, 0)
+    tissue = held(mesh, blade=BladeShape())
+    last = strokes.make(tissue, strokes.THROUGH[kind](mesh))[-1]
+    faces = tissue.cut_faces()
+    assert last.cut_area > 0.04**2
+    assert faces.areas.sum() == pytest.approx(last.cut_area, rel=ROUNDING)
+    np.testing.assert_allclose(faces.areas, areas_of(faces.corners), rtol=ROUNDING)
+
+
+def test_areas_of_the_paper_s_scheme_add_up_too():
+    mesh = block((3, 3, 3), (0.04, 0.04, 0.04))
+    springs = Material(law="springs", poisson_ratio=0.25)
+    tissue = Tissue(mesh, springs, fixed=bodies.sides(mesh), solver=SolverSettings(scheme="paper"))
+    last = strokes.make(tissue, strokes.straight(mesh, 0.47))[-1]
+    assert last.cut_area > 0.0
+    assert tissue.cut_faces().areas.sum() == pytest.approx(last.cut_area, rel=ROUNDING)
+
+
+def test_a_face_that_a_second_cut_divides_is_listed_once():
+    """The second crosses the first at right angles, and leaves four pieces."""
+    size = 0.04
+    tissue = held(bodies.jittered_grid(5, 1, size))
+    low, high, middle = -0.01, 0.05, 0.5 * size
+    for a, b, forward in (
+        ((middle, low), (middle, high), (0.0, 1.0, 0.0)),
+        ((low, middle), (high, middle), (1.0, 0.0, 0.0)),
+    ):
+        tissue.incise([[[*at, z] for z in (low, high)] for at in (a, b)], forward)
+    assert tissue.n_pieces() == 4
+    total = tissue.cut_faces().areas.sum()
+    opened = tissue.surface()
+    in_surface = 0.5 * areas_of(opened.rest_positions[opened.triangles[opened.is_cut]]).sum()
+    assert total == pytest.approx(in_surface, rel=ROUNDING)
+    assert total == pytest.approx(2.0 * size**2, rel=0.05)  # cuts go through nodes near them
+
+
+def test_new_faces_are_read_from_a_number_on():
+    mesh = bodies.jittered(4, 0)
+    tissue, n, found = held(mesh), 0, []
+    for sweep in strokes.sweeps(strokes.straight(mesh)):
+        tissue.step(sweep, strokes.DT)
+        found.append(tissue.cut_faces(since=n))
+        n = tissue.n_cut_faces
+    whole = tissue.cut_faces()
+    for part in range(5):
+        np.testing.assert_array_equal(np.concatenate([each[part] for each in found]), whole[part])
+    with pytest.raises(ValueError, match="no face number"):
+        tissue.cut_faces(since=n + 1)
+
+
+def test_a_face_knows_its_step_its_cause_and_the_tissue_on_both_sides():
+    """The blade goes along the border of two labels; before, a slit was given."""
+    mesh = block((4, 4, 4), (0.04, 0.04, 0.04))
+    x = mesh.positions[mesh.tetrahedra].mean(axis=1)[:, 0]
+    labels = np.where(x < 0.02, 3, 7)
+    tissue = held(mesh._replace(labels=labels))
+    tissue.incise([[[0.02, y, z] for z in (0.02, 0.05)] for y in (-0.01, 0.021)], (0.0, 1.0, 0.0))
+    n = tissue.n_cut_faces
+    given = tissue.cut_faces()
+    assert n > 0
+    assert (given.causes == 2).all()
+    assert (given.times == 0.0).all()
+    cut_at = []
+    for i, sweep in enumerate(strokes.sweeps(strokes.straight(mesh))):
+        tissue.step(sweep, strokes.DT)
+        cut_at += [strokes.DT * (i + 1)] * (tissue.n_cut_faces - n - len(cut_at))
+    faces = tissue.cut_faces(since=n)
+    assert (faces.causes == 0).all()
+    np.testing.assert_allclose(faces.times, cut_at, rtol=ROUNDING)
+    assert (np.sort(faces.labels, axis=1) == (3, 7)).all()
+
+
+def test_finished_bridges_are_named_as_such():
+    """Of 60 mm the edge cuts 55; the rest is a bridge that is finished."""
+    tissue = Tissue(block(), gravity=(0.0, 0.0, 0.0))
+    stages, forward = tissue._stages, np.tile([0.0, 1.0, 0.0], (2, 1))
+    rows = np.array([[[0.02, y, z] for z in (-0.01, 0.05)] for y in (-0.01, 0.055)])
+    cut_along(stages.incision, stages.hooks, rows, forward, tissue.node_size)
+    stages.incision.path.has_left = 1
+    stages.end_incision()
+    faces = tissue.cut_faces()
+    assert faces.areas[faces.causes == 1].sum() == pytest.approx(0.005 * 0.04, rel=ROUNDING)
+    assert faces.areas[faces.causes == 0].sum() == pytest.approx(0.055 * 0.04, rel=ROUNDING)
+
+
+@pytest.mark.parametrize("as_bytes", [False, True])
+def test_a_state_has_the_faces(as_bytes):
+    mesh = bodies.jittered(4, 0)
+    sweeps = list(strokes.sweeps(strokes.straight(mesh)))
+    tissue = held(mesh)
+    for sweep in sweeps[:150]:
+        tissue.step(sweep, strokes.DT)
+    state, then = tissue.save_state(), tissue.cut_faces()
+    assert len(then) > 0
+    for sweep in sweeps[150:]:
+        tissue.step(sweep, strokes.DT)
+    whole = tissue.cut_faces()
+    assert len(whole) > len(then)
+    if as_bytes:
+        tissue, state = held(mesh), TissueState.from_bytes(state.to_bytes())
+    tissue.load_state(state)
+    for found, expected in zip(tissue.cut_faces(), then, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    for sweep in sweeps[150:]:
+        tissue.step(sweep, strokes.DT)
+    for found, expected in zip(tissue.cut_faces(), whole, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_strains_of_material_points_are_those_of_their_tetrahedra():
+    mesh = bodies.jittered(3, 0)
+    stretched = mesh.positions * (1.0, 1.2, 1.0)
+    tissue = Tissue(mesh, Material(), positions=stretched, gravity=(0.0, 0.0, 0.0))
+    middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
+    strains = tissue.strains_of(tissue.material_points(middles))
+    np.testing.assert_allclose(strains, 0.5 * (1.2**2 - 1.0), rtol=1e-9)
