@@ -5,6 +5,9 @@ from .arm.flex import take_flex as take_flex
 from .arm.grasper import Grasper as Grasper
 from .arm.grasper import add_grasper as add_grasper
 from .arm.scalpel import add_scalpel as add_scalpel
+from .camera.camera import Camera as Camera
+from .camera.lights import Light as Light
+from .camera.theatre import Theatre as Theatre
 from .instruments.driven_grasper import between_pads as between_pads
 from .instruments.geom_coupling import GeomCoupling as GeomCoupling
 from .instruments.grip import Grip as Grip
@@ -35,6 +38,7 @@ from .viewer.viewer import Viewer as Viewer
 __all__ = [
     "Blade",
     "COLUMNS",
+    "Camera",
     "ColumnGroup",
     "FrameData",
     "GeomCoupling",
@@ -45,6 +49,7 @@ __all__ = [
     "OBSERVATIONS",
     "LyingBody",
     "RunRecorder",
+    "Light",
     "SCALPEL",
     "FlexBody",
     "FlexError",
@@ -56,6 +61,7 @@ __all__ = [
     "Simulation",
     "SimulationState",
     "StrokeTable",
+    "Theatre",
     "Viewer",
     "WaypointTable",
     "add_grasper",

@@ -25,6 +25,7 @@ from scalpel_sim.recording.columns import (
 from scalpel_sim.recording.observations import MaterialSamples, observed, result_at_rest
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.recording.row_writer import RowWriter
+from scalpel_sim.scene.scene import Scene
 from scalpel_sim.state import SimulationState, StartState
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, StageTimes, StateError, StepResult, Wrench
@@ -107,6 +108,8 @@ class Simulation:
         self.workspace: FloatArray | None = None
         """Where a hand may lead the middle of the edge [m], tissue frame: the lowest and the
         highest place, shape (2, 3); None: the blade follows a script."""
+        self.scene: Scene | None = None
+        """Scene that it was made from; None: it was made without one."""
         self.expected_force: float | None = None
         """Force of the cut if the body does not give way [N]; None where that is not known."""
         self.pictures: list[DrawFrame] = []

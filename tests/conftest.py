@@ -17,6 +17,7 @@ from tests.support.battery import (
     tally,
 )
 from tests.support.browser import browser, tab
+from tests.support.egl import renderer
 from tests.support.small_disk import small_disks
 
 # A shell that starts the tests in the background has Ctrl-C ignored, by their children too.
@@ -28,6 +29,7 @@ KERNELS_AT_IMPORT = pytest.StashKey[list[str]]()
 
 __all__ = [
     "browser",
+    "renderer",
     "small_disks",
     "tab",
     "tally",

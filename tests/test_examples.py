@@ -60,6 +60,16 @@ def test_an_attached_arm_cuts_a_block_in_two_with_a_force_set_by_toughness(run):
     assert int(pieces) == 2
 
 
+def test_images_of_a_cut_show_what_there_is(run, tmp_path, renderer):
+    pixels = {
+        name: (int(n), float(mm))
+        for name, n, mm in re.findall(r"(\w+): (\d+) pixels, from (\d+) mm", run("camera.py"))
+    }
+    assert pixels.keys() == {"skin", "cut", "blade"} and min(n for n, _ in pixels.values()) > 50
+    assert all(20.0 < mm < 200.0 for _, mm in pixels.values())
+    assert (tmp_path / "endoscope.png").exists() and (tmp_path / "overview.png").exists()
+
+
 def test_an_edge_moved_through_a_block_meets_toughness_times_thickness(run):
     peak, area, _, pieces = numbers(run("cut_block.py"))
     assert peak == pytest.approx(20.0 * 0.02, rel=0.2)

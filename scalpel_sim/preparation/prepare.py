@@ -104,6 +104,7 @@ def prepare(
         coupling=scene.virtual_coupling(),
         passivity=scene.arm.passivity,
     )
+    simulation.scene = scene
     simulation.records = records
     simulation.workspace = stands.room
     simulation.expected_force = needed.force

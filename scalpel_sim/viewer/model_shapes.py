@@ -28,6 +28,8 @@ class Shape(NamedTuple):
 
     name: str
     """The geom's name; its number if it has none."""
+    geom: int
+    """Number of the geom."""
     body: int
     """Number of the body that the geom belongs to."""
     root: int
@@ -81,6 +83,7 @@ def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
         if mesh is not None:
             yield Shape(
                 name=names[geom] or free_name(str(geom), names),
+                geom=geom,
                 body=body,
                 root=int(model.body_rootid[body]),
                 kind=kind,

@@ -206,7 +206,7 @@ def factors_of_labels(look: Look) -> tuple[FloatArray, FloatArray]:
     """
     names = [each.skin for each in look.labels], [each.inside for each in look.labels]
     outside, inside = (
-        _linear(colours) / _linear([_at(ramp, 0.5)])
+        _linear(colours) / _linear([colour_at(ramp, 0.5)])
         for colours, ramp in zip(names, (look.skin, look.inside), strict=True)
     )
     return tuple(
@@ -214,7 +214,7 @@ def factors_of_labels(look: Look) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _at(ramp: Ramp, position: float) -> str:
+def colour_at(ramp: Ramp, position: float) -> str:
     """Return the colour of a ramp at a position on it."""
     knots = [knot for knot, _ in ramp]
     colours = np.array([list(bytes.fromhex(colour)) for _, colour in ramp], dtype=float)
@@ -256,6 +256,50 @@ def _nodes_of(triangles: IntArray, corners: IntArray) -> IntArray:
     return nodes
 
 
+class Charts(NamedTuple):
+    """Triangles of a surface as its charts have them: what stays while the body only deforms."""
+
+    nodes: IntArray
+    """Vertex of the surface that each vertex of the charts is, shape (n_vertices,)."""
+    corners: IntArray
+    """Vertices of the charts at the corners of the triangles, shape (n_triangles, 3)."""
+    triangles: IntArray
+    """Vertices of the surface at these corners, shape (n_triangles, 3)."""
+    is_on_crease: BoolArray
+    """Whether each vertex lies on a crease of the body at rest, shape (n_vertices,)."""
+    uv: FloatArray
+    """Texture coordinates of each vertex in repeats, shape (n_vertices, 2)."""
+
+    def mesh(self, positions: FloatArray) -> TriangleMesh:
+        """Return the triangles where the vertices of the surface are now [m], without tints."""
+        n = len(self.nodes)
+        faces = _area_normals(positions, self.triangles)
+        of_node = _gather(faces, self.triangles, len(positions))[self.nodes]
+        of_chart = _gather(faces, self.corners, n)
+        normals = _unit(np.where(self.is_on_crease[:, None], of_chart, of_node))
+        return TriangleMesh(positions[self.nodes], self.corners, normals, self.uv)
+
+
+def charts_of(rest_positions: FloatArray, triangles: IntArray, tile: float) -> Charts:
+    """Return the charts of some triangles of a surface.
+
+    Args:
+        rest_positions: Of the vertices of the surface [m], shape (n, 3).
+        triangles: The triangles, shape (n_triangles, 3).
+        tile: Length of the material that one repeat of the texture covers [m].
+    """
+    rest_faces = _area_normals(rest_positions, triangles)
+    axis = np.abs(rest_faces).argmax(axis=1)
+    upward = np.take_along_axis(rest_faces, axis[:, None], axis=1)[:, 0] > 0.0
+    corner_keys = N_CHARTS * triangles + (2 * axis + upward)[:, None]
+    keys, corners = _unique(corner_keys, N_CHARTS * len(rest_positions))
+    nodes, chart = keys // N_CHARTS, keys % N_CHARTS
+    is_on_crease = _is_on_crease(rest_faces, triangles, corners, nodes, len(rest_positions))
+    rest = rest_positions[nodes]
+    uv = np.take_along_axis(rest, CHART_AXES[chart], axis=1) / tile + CHART_SHIFT[chart]
+    return Charts(nodes, corners, triangles, is_on_crease, uv)
+
+
 def _textured_triangles(
     surface: Surface,
     triangles: IntArray,
@@ -264,26 +308,10 @@ def _textured_triangles(
     variation: float,
 ) -> TriangleMesh:
     """Return some triangles of the surface as a mesh of its own."""
-    rest_faces = _area_normals(surface.rest_positions, triangles)
-    axis = np.abs(rest_faces).argmax(axis=1)
-    upward = np.take_along_axis(rest_faces, axis[:, None], axis=1)[:, 0] > 0.0
-    corner_keys = N_CHARTS * triangles + (2 * axis + upward)[:, None]
-    keys, corners = _unique(corner_keys, N_CHARTS * len(surface.positions))
-    node, chart = keys // N_CHARTS, keys % N_CHARTS
-
-    faces = _area_normals(surface.positions, triangles)
-    is_on_crease = _is_on_crease(rest_faces, triangles, corners, node, len(surface.positions))
-    of_chart = _gather(faces, corners, len(keys))
-    of_node = _gather(faces, triangles, len(surface.positions))[node]
-
-    rest = surface.rest_positions[node]
-    return TriangleMesh(
-        positions=surface.positions[node],
-        triangles=corners,
-        normals=_unit(np.where(is_on_crease[:, None], of_chart, of_node)),
-        uv=np.take_along_axis(rest, CHART_AXES[chart], axis=1) / tile + CHART_SHIFT[chart],
-        tints=_tints(rest / tile, variation),
-        levels={name: values[node] for name, values in levels.items()},
+    charts = charts_of(surface.rest_positions, triangles, tile)
+    return charts.mesh(surface.positions)._replace(
+        tints=_tints(surface.rest_positions[charts.nodes] / tile, variation),
+        levels={name: values[charts.nodes] for name, values in levels.items()},
     )
 
 

@@ -1,0 +1,283 @@
+"""A camera of a simulation, or of a model and tissue of your own."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple, Self
+
+import mujoco
+import numpy as np
+
+from scalpel_sim.camera.canvas import Canvas, PixelSize, Thing
+from scalpel_sim.camera.finishes import Finish
+from scalpel_sim.camera.identities import Identities
+from scalpel_sim.camera.lights import Light, endoscope_lights, room_lights
+from scalpel_sim.camera.theatre import Theatre, theatre_of
+from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
+from scalpel_sim.camera.viewpoints import (
+    ENDOSCOPE,
+    OVERVIEW,
+    Viewpoint,
+    camera_names,
+    expect_camera,
+    model_cameras,
+    shipped_viewpoint,
+    viewpoint_of,
+)
+from scalpel_sim.errors import UsageError
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.viewer.looks import look_of
+from scalpel_sim.viewer.model_shapes import shapes_of
+from tissue import IntArray
+
+_STEEL = Finish((0.8, 0.82, 0.85, 1.0), gloss=1.0, shininess=0.9)
+"""Look of a blade."""
+
+_WALL = (0.86, 0.89, 0.9)
+"""Colour where nothing is, if the model has no sky: that of the page (sRGB)."""
+
+_MOST_PIXELS = 8192
+"""Longest side of an image [pixels]."""
+
+
+class CameraImage(NamedTuple):
+    """Arrays of one instant."""
+
+    rgb: np.ndarray
+    """Red, green and blue as bytes, shape (height, width, 3)."""
+    depth: np.ndarray
+    """Depth along the line of sight [m], float32, shape (height, width)."""
+    segmentation: IntArray
+    """Number of what each pixel shows, int32, shape (height, width): see `Camera.ids`."""
+
+
+class Camera:
+    """A camera that sees the arm and the tissue as they are when an image is taken.
+
+    For example:
+
+        camera = Camera(prepare(SCENES["organ"]), "endoscope", width=320, height=240)
+        rgb, depth, segmentation = camera.image()
+
+    The first row of an image is the upper one. Nothing of the simulation is changed, and the
+    user's model stays the same to the byte. Images need no screen and no graphics card; the first
+    one opens OpenGL, in the process and for the thread that takes it.
+
+    Args:
+        sees: A simulation; or a `Theatre`, for a loop of your own.
+        name: A `[[view]]` of the scene, a camera of the model, or `overview` or `endoscope`, which
+            are always there: for arms and body as they are when the camera is made.
+        width: Width of the images [pixels].
+        height: Height of the images [pixels].
+        shadows: Whether lamps cast shadows: an image then takes several times as long.
+        samples: Samples of each pixel against jagged edges, such as 4; 0: one.
+        lights: Lamps; None: those of the model for its own cameras, a lamp beside the lens for
+            `endoscope`, the lamps of the page for all others.
+
+    Raises:
+        UsageError: no camera has this name, or an image cannot have this size.
+    """
+
+    def __init__(
+        self,
+        sees: Simulation | Theatre,
+        name: str = OVERVIEW,
+        *,
+        width: int = 640,
+        height: int = 480,
+        shadows: bool = False,
+        samples: int = 0,
+        lights: Sequence[Light] | None = None,
+    ) -> None:
+        theatre = sees if isinstance(sees, Theatre) else theatre_of(sees)
+        self._stage = _Stage(theatre, shadows=shadows, samples=samples)
+        self._aim(name, PixelSize(width, height), lights)
+
+    def another(
+        self,
+        name: str,
+        *,
+        width: int | None = None,
+        height: int | None = None,
+        lights: Sequence[Light] | None = None,
+    ) -> "Camera":
+        """Return a further camera of the same, which costs less than one by itself.
+
+        Args:
+            name: See `Camera`.
+            width: Width of its images [pixels]; None: as of this one.
+            height: Height of its images [pixels]; None: as of this one.
+            lights: See `Camera`.
+
+        Raises:
+            UsageError: no camera has this name, or an image cannot have this size.
+        """
+        other = Camera.__new__(Camera)
+        other._stage = self._stage
+        other._aim(name, PixelSize(width or self.width, height or self.height), lights)
+        return other
+
+    def _aim(self, name: str, size: PixelSize, lights: Sequence[Light] | None) -> None:
+        """Choose the place, the size and the lamps."""
+        if not all(1 <= side <= _MOST_PIXELS for side in size):
+            raise UsageError(
+                f"an image of {size.width} x {size.height} pixels: each side must have 1 to "
+                f"{_MOST_PIXELS}"
+            )
+        self.name = name
+        """Name of the camera."""
+        self._size = size
+        self._view = self._stage.view(name)
+        self.lights: Sequence[Light] | None = lights
+        """Lamps of the next image; None: those of the model, and one at the eye."""
+        if lights is None and isinstance(self._view, Viewpoint):
+            is_inside = name == ENDOSCOPE
+            self.lights = endoscope_lights(self._view) if is_inside else room_lights(self._view)
+
+    @property
+    def width(self) -> int:
+        """Width of the images [pixels]."""
+        return self._size.width
+
+    @property
+    def height(self) -> int:
+        """Height of the images [pixels]."""
+        return self._size.height
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all cameras that there are."""
+        theatre = self._stage.theatre
+        return camera_names(theatre.views, theatre.model)
+
+    @property
+    def ids(self) -> Mapping[str, int]:
+        """Numbers of a segmentation by the names of what they stand for.
+
+        0 is `nothing`; then `skin` and `cut`, or the outside of each label by its name and its cut
+        faces as `cut NAME`; then `blade`, each grasper by its name, `arm` and `world`. They hang
+        on the scene, and not on what is in the image.
+        """
+        return MappingProxyType(self._stage.identities.table)
+
+    @property
+    def far(self) -> float:
+        """Depth where nothing is [m]: `zfar` times the extent of the model, as MuJoCo has it."""
+        return self._stage.canvas.far
+
+    @property
+    def option(self) -> mujoco.MjvOption:
+        """MuJoCo's options of what is drawn of the model, which may be changed.
+
+        All cameras that come of one another share them.
+        """
+        return self._stage.canvas.option
+
+    @property
+    def renderer(self) -> str:
+        """Name of what draws; images of two differ in a few bits: note it in a dataset."""
+        return self._stage.canvas.renderer()
+
+    def rgb(self) -> np.ndarray:
+        """Return red, green and blue as bytes, shape (height, width, 3)."""
+        self._look()
+        return self._stage.canvas.colours(self._size)
+
+    def depth(self) -> np.ndarray:
+        """Return the depth along the line of sight [m], float32, shape (height, width).
+
+        Where nothing is, it is `far`. What is transparent counts as solid.
+        """
+        self._look()
+        return self._stage.canvas.depth(self._size)
+
+    def segmentation(self) -> IntArray:
+        """Return what each pixel shows, int32, shape (height, width): see `ids`."""
+        self._look()
+        places, things = self._stage.canvas.numbers(self._size)
+        return self._ids_of(things)[places]
+
+    def image(self) -> CameraImage:
+        """Return all that the camera sees at this instant, for less than one after the other."""
+        self._look()
+        canvas = self._stage.canvas
+        places, things, depth = canvas.numbers_and_depth(self._size)
+        return CameraImage(canvas.colours(self._size), depth, self._ids_of(things)[places])
+
+    def close(self) -> None:
+        """Free what OpenGL holds, of all cameras that come of one another."""
+        self._stage.canvas.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _look(self) -> None:
+        self._stage.refresh()
+        self._stage.canvas.look(self._view, self._stage.theatre.data, self.lights)
+
+    def _ids_of(self, things: Iterable[Thing]) -> IntArray:
+        return self._stage.identities.of(things)
+
+
+class _Stage:
+    """Canvas of cameras that come of one another, and the tissue in it.
+
+    Args:
+        theatre: What they see.
+        shadows: Whether lamps cast shadows.
+        samples: Samples of each pixel.
+    """
+
+    def __init__(self, theatre: Theatre, *, shadows: bool, samples: int) -> None:
+        self.theatre, self._link = theatre, theatre.link
+        labels: dict[int, str] = {}
+        finishes, self._parts = {}, None
+        if self._link is not None:
+            material = self._link.describe().material
+            look = theatre.look or look_of(material)
+            labels = theatre.labels()
+            self._parts = TissueParts(labels)
+            finishes = part_finishes(labels, look)
+        self.identities = Identities(theatre, list(finishes))
+        sheets = [shape for shape in shapes_of(theatre.model) if shape.is_blade]
+        names = {shape.geom: f"blade of geom {shape.geom}" for shape in sheets}
+        self.canvas = Canvas(
+            theatre.model,
+            finishes=finishes | dict.fromkeys(names.values(), _STEEL),
+            shadows=shadows,
+            samples=samples,
+            background=_WALL,
+        )
+        for shape in sheets:  # a box in the model, whose edge is in the middle of a side
+            self.canvas.replace_geom(shape.geom, names[shape.geom], shape.mesh)
+        if self._link is not None:
+            points = theatre.frame.points_to_world(self._link.surface().positions)
+            self.canvas.middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            self.canvas.extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+
+    def view(self, name: str) -> Viewpoint | int:
+        """Return the place of a camera; or its number, of one of the model.
+
+        Raises:
+            UsageError: no camera has this name.
+        """
+        theatre = self.theatre
+        expect_camera(name, theatre.views, theatre.model)
+        for view in theatre.views:
+            if view.name == name:
+                return viewpoint_of(view, theatre.frame)
+        number = model_cameras(theatre.model).get(name)
+        if number is not None:
+            return number
+        points = np.zeros((1, 3)) if self._link is None else self._link.surface().positions
+        return shipped_viewpoint(name, theatre.model, theatre.data, points, theatre.frame)
+
+    def refresh(self) -> None:
+        """Draw the tissue as it now is."""
+        if self._link is None or self._parts is None:
+            return
+        if self._parts.show(self._link.surface()):
+            for name, mesh in self._parts.meshes.items():
+                self.canvas.put(name, mesh, self.theatre.frame)

@@ -1,0 +1,117 @@
+"""OpenGL without a screen."""
+
+import importlib
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+
+from scalpel_sim.errors import RunError
+
+RENDERER_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri libgl1"
+"""Packages of Debian and Ubuntu that draw without a screen and without a graphics card."""
+
+_BACKEND = "MUJOCO_GL"
+_THREADS = "LP_NUM_THREADS"
+
+_ONE_THREAD = "1"
+"""Threads of Mesa's renderer for processors, where nobody asked for others: an image is small, and
+what runs beside it has a use for the other cores."""
+
+
+_opened_in: set[int] = set()
+"""Processes that have opened OpenGL: this one, or one that it was forked from."""
+
+
+class RenderError(RunError):
+    """There is no OpenGL that could draw."""
+
+
+def open_context() -> Any:
+    """Return a new context of OpenGL, which is current in this thread.
+
+    On Linux it is EGL's, which needs no screen, unless `MUJOCO_GL` says otherwise.
+
+    Raises:
+        RenderError: there is none; the message says what to install.
+    """
+    expect_own_process()
+    chosen = os.environ.get(_BACKEND, "").lower().strip()
+    os.environ.setdefault(_THREADS, _ONE_THREAD)
+    try:
+        if platform.system() == "Linux" and chosen in ("", "egl"):
+            context = importlib.import_module("mujoco.egl").GLContext(1, 1)
+        elif platform.system() == "Linux" and chosen == "osmesa":
+            context = importlib.import_module("mujoco.osmesa").GLContext(1, 1)
+        else:
+            context = mujoco.GLContext(1, 1)
+        context.make_current()
+    # The libraries that are missing show as any of these.
+    except (ImportError, AttributeError, RuntimeError, OSError) as error:
+        wanted = f"with {_BACKEND}={chosen}" if chosen else "by EGL"
+        raise RenderError(
+            f"images cannot be drawn: there is no OpenGL {wanted} ({_reason(error)}). On Debian "
+            f"and Ubuntu: apt-get install {RENDERER_PACKAGES}"
+        ) from error
+    _opened_in.add(os.getpid())
+    return context
+
+
+def expect_own_process() -> None:
+    """Refuse to draw in a fork of a process that has drawn: Mesa's threads are not in it.
+
+    Raises:
+        RenderError: this is one; the message says what to do.
+    """
+    if _opened_in and os.getpid() not in _opened_in:
+        raise RenderError(
+            "this process was forked from one that has drawn images, and OpenGL does not survive "
+            "that. Start it by `spawn` (multiprocessing.get_context), or fork before the first "
+            "image"
+        )
+
+
+@contextmanager
+def chosen_backend() -> Iterator[None]:
+    """Make MuJoCo load the functions of the context that `open_context` made."""
+    before = os.environ.get(_BACKEND)
+    if platform.system() == "Linux" and not before:
+        os.environ[_BACKEND] = "egl"
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(_BACKEND, None)
+        else:
+            os.environ[_BACKEND] = before
+
+
+def renderer_name() -> str:
+    """Return what draws: the names of renderer and version that OpenGL gives.
+
+    Images of two renderers differ in a few bits: it belongs into a dataset.
+
+    Raises:
+        RenderError: there is none; the message says what to install.
+    """
+    context = open_context()
+    try:
+        return current_renderer()
+    finally:
+        context.free()
+
+
+def current_renderer() -> str:
+    """Return the names of renderer and version of the context that is current."""
+    gl = importlib.import_module("OpenGL.GL")
+    names = (gl.glGetString(each) for each in (gl.GL_RENDERER, gl.GL_VERSION))
+    return ", OpenGL ".join(name.decode("ascii", "replace") for name in names)
+
+
+def _reason(error: Exception) -> str:
+    """Return the first line of an error."""
+    lines = str(error).strip().splitlines()
+    return lines[0] if lines else type(error).__name__

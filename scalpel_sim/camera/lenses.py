@@ -1,0 +1,44 @@
+"""The lenses of a scene of MuJoCo: where they are, and from where to where they see."""
+
+import mujoco
+import numpy as np
+
+from scalpel_sim.camera.viewpoints import Viewpoint
+
+NEAREST = 1e-3
+"""Distance from the eye below which nothing is drawn [m]. MuJoCo's own is a share of the extent of
+the model, a centimetre or more for an arm, and would cut off what an endoscope sees."""
+
+_SKY = 2.0
+"""Distance of the sky over that beyond which nothing else is. It is a cube with half a diagonal
+of it, so that it begins at 2 / sqrt(3): beyond all else in the depth of an image."""
+
+
+def aim(scene: mujoco.MjvScene, view: Viewpoint, far: float) -> None:
+    """Aim both eyes of a scene.
+
+    Args:
+        scene: The scene.
+        view: Where from.
+        far: Distance beyond which nothing is drawn [m].
+    """
+    forward, up = view.axes()
+    half = NEAREST * float(np.tan(np.radians(0.5 * view.fov_degrees)))
+    for lens in scene.camera:
+        lens.pos, lens.forward, lens.up = view.eye, forward, up
+        lens.frustum_near, lens.frustum_far = NEAREST, far
+        lens.frustum_bottom, lens.frustum_top = -half, half
+        lens.frustum_center = lens.frustum_width = 0.0
+        lens.orthographic = False
+
+
+def widen_range(scene: mujoco.MjvScene) -> None:
+    """Make a scene show what is as near to its eyes as `NEAREST`, and the sky behind all else."""
+    for lens in scene.camera:
+        lens.frustum_far *= _SKY
+        share = NEAREST / lens.frustum_near
+        if lens.orthographic or share >= 1.0:
+            continue
+        for side in ("near", "bottom", "top", "width", "center"):
+            name = f"frustum_{side}"
+            setattr(lens, name, share * getattr(lens, name))
