@@ -1,7 +1,7 @@
 """From the command line's options to a run that only has to be started."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +35,7 @@ from scalpel_sim.scene.read import read_scene
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.served import scene_of
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.tables.text_files import is_toml_file
 from tissue import MANY_SUBSTEPS, MOST_SUBSTEPS
 from tissue.support import whole_file
@@ -84,6 +85,7 @@ def prepared_run(
     audits: bool = False,
     relaxation: str | None = None,
     is_led: bool = False,
+    strokes: Sequence[StrokeTable] = (),
 ) -> Iterator[PreparedRun]:
     """Yield the run that the command line requests, and close the link to the tissue afterwards.
 
@@ -94,6 +96,7 @@ def prepared_run(
         relaxation: How the motion is advanced where nothing is said of it, and the tissue does not
             stiffen; None: as the scene has it.
         is_led: Whether a hand will lead the blade.
+        strokes: Strokes in place of those of the scene, where there are any; the tissue is here.
 
     Raises:
         UsageError: options that make no sense, or not together.
@@ -110,7 +113,12 @@ def prepared_run(
             check_exports(options.output.export)
             checkpoint_seconds = _checkpoint_seconds(options)
             if client.connect is None:
-                link, scene, settings = _tissue_here(name, options, audits, relaxation)
+                asked = chosen_scene(
+                    name, options.tissue, options.arm, relaxation=relaxation, audits=audits
+                )
+                if strokes:
+                    asked = changed(asked, strokes=tuple(strokes), seconds=None)
+                link, scene, settings = _tissue_here(asked, options)
             else:
                 link, scene, settings = _tissue_elsewhere(name, options, client.connect)
             stack.callback(link.close)
@@ -131,15 +139,11 @@ def prepared_run(
         )
 
 
-def _tissue_here(
-    name: str | None, options: RunOptions, audits: bool, relaxation: str | None
-) -> tuple[TissueLink, Scene, dict[str, Any]]:
+def _tissue_here(scene: Scene, options: RunOptions) -> tuple[TissueLink, Scene, dict[str, Any]]:
     """Make the tissue in this process, after all checks that need none."""
-    tissue = options.tissue
-    scene = chosen_scene(name, tissue, options.arm, relaxation=relaxation, audits=audits)
     check_scene(scene)
     check_folder(_folder(options.output, scene))
-    scene, springs = springs_as_asked(scene, tissue.material)
+    scene, springs = springs_as_asked(scene, options.tissue.material)
     load_kernels(options.printing, scene)
     _log.info("settling %s", scene.about)
     return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings() | springs

@@ -15,8 +15,9 @@ from scalpel_sim.runs.options import (
 )
 
 if TYPE_CHECKING:  # an error of use should be printed without waiting for a compiler
-    from scalpel_sim.hands.commands import Begin
+    from scalpel_sim.hands.commands import Begin, DrawnLine
     from scalpel_sim.runs.prepared_run import PreparedRun
+    from scalpel_sim.strokes.kind import StrokeTable
 
 
 def view(
@@ -63,10 +64,22 @@ def view(
                 options._replace(tissue=_changed(tissue, asked)),
                 relaxation="verlet",
                 is_led=asked.is_led,
+                strokes=[_stroke_along(line) for line in asked.lines],
             )
 
         with LiveSession(prepare, page, device) as session:
             session.perform()
+
+
+def _stroke_along(line: "DrawnLine") -> "StrokeTable":
+    """Return the stroke along a line that was drawn in the page."""
+    from scalpel_sim.strokes.kind import StrokeTable
+
+    points = [(x, y, z) for x, y, z in line.points]
+    x, y, z = line.edge
+    return StrokeTable(
+        kind="traced", points=points, edge=(x, y, z), depth=line.depth, speed=line.speed
+    )
 
 
 def _changed(tissue: TissueOptions, asked: "Begin") -> TissueOptions:

@@ -5,8 +5,14 @@ from typing import Annotated
 
 import msgspec
 
-LONGEST_MESSAGE = 256
-"""Longest message [bytes]. The longest that makes sense has some 120."""
+LONGEST_MESSAGE = 1 << 13
+"""Longest message [bytes]. A hand's have some 120, and lines that are drawn 30 for each point."""
+
+MOST_LINES, MOST_POINTS = 8, 100
+"""Lines that are cut in a run, and points of a line, at most."""
+
+DEEPEST_LINE, FASTEST_LINE = 0.1, 0.2
+"""Deepest cut along a line [m], and the fastest [m/s]: no hand cuts faster along a line."""
 
 FARTHEST_MOVE = 0.1
 """Largest displacement of one message [m]: more than the width of a body is no hand's."""
@@ -36,6 +42,7 @@ skin and of any scalpel."""
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{0,64}$")]
 _ThreeNumbers = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+_Points = Annotated[list[_ThreeNumbers], msgspec.Meta(min_length=2, max_length=MOST_POINTS)]
 _Stamp = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST_STAMP)]
 
 
@@ -131,6 +138,29 @@ class Reset(_Message, frozen=True, tag="reset"):
     """The run goes back to its start."""
 
 
+class DrawnLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A line on the skin along which the script is to cut: a stroke `traced`."""
+
+    points: _Points
+    """Places on the skin of the body at rest [m], tissue frame."""
+    edge: _ThreeNumbers
+    """Direction from tip to heel: against the depth."""
+    depth: Annotated[float, msgspec.Meta(gt=0.0, le=DEEPEST_LINE)]
+    """Depth of the cut [m]."""
+    speed: Annotated[float, msgspec.Meta(gt=0.0, le=FASTEST_LINE)]
+    """Speed of the blade [m/s]."""
+
+
+_Lines = Annotated[list[DrawnLine], msgspec.Meta(max_length=MOST_LINES)]
+
+
+class CutLines(_Message, frozen=True, tag="cut"):
+    """The run is to end, and the same to begin again, in which the script cuts along lines."""
+
+    lines: _Lines
+    """The lines, in turn; none: the strokes of the scene."""
+
+
 class Begin(_Message, frozen=True, tag="begin"):
     """The run is to end, and another to begin. What is None is as in the scene."""
 
@@ -144,6 +174,8 @@ class Begin(_Message, frozen=True, tag="begin"):
     """Thickness of the blade [m]."""
     is_led: bool = False
     """Whether the page leads the blade in it."""
+    lines: _Lines = []
+    """Lines along which the script cuts, in place of the strokes of the scene."""
 
 
 LeadingCommand = Engage | Release | Move | Aim | Turn | StillThere | Choose | Jaws | End
@@ -152,7 +184,7 @@ LeadingCommand = Engage | Release | Move | Aim | Turn | StillThere | Choose | Ja
 RunCommand = Pause | Resume | Step | SlowMotion | Undo | Reset
 """Commands that are done between two frames."""
 
-Command = LeadingCommand | RunCommand | Begin | Lead
+Command = LeadingCommand | RunCommand | Begin | CutLines | Lead
 
 _decoder: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
 

@@ -11,6 +11,7 @@ from scalpel_sim.hands.commands import (
     Begin,
     Choose,
     Command,
+    CutLines,
     End,
     Engage,
     Jaws,
@@ -213,7 +214,7 @@ class RunControls:
         """Whether time stands still."""
         self.has_ended = False
         """Whether the page has ended the run."""
-        self.next: Begin | None = None
+        self.next: Begin | CutLines | None = None
         """The run that the page has requested after this one."""
         self.notice = ""
         """Message of the page to the person."""
@@ -261,7 +262,7 @@ class RunControls:
         self.pace.rate = rate
         self.on_change()
 
-    def end(self, following: Begin | None = None) -> None:
+    def end(self, following: Begin | CutLines | None = None) -> None:
         """End the run; `following` is the one after it."""
         if following is not None:
             self.next = following
@@ -322,6 +323,7 @@ RUN_COMMANDS: dict[type[Command], Callable[[RunControls, Any], None]] = {
     Undo: lambda run, _: run.go_back(to_start=False),
     Reset: lambda run, _: run.go_back(to_start=True),
     Begin: lambda run, command: run.end(command),
+    CutLines: lambda run, command: run.end(command),
     End: lambda run, _: run.end(),
     Choose: RunControls.choose,
     Engage: RunControls.begin_stroke,

@@ -9,9 +9,11 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import NamedTuple, Self
 
+from msgspec.structs import replace
+
 from bridge import LinkError
 from scalpel_sim.errors import RunError
-from scalpel_sim.hands.commands import Begin, Choose, Command, End, Engage, Jaws, Reset
+from scalpel_sim.hands.commands import Begin, Choose, Command, CutLines, End, Engage, Jaws, Reset
 from scalpel_sim.hands.run_controls import History, Pace, RunControls, RunResults
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.report import headline
@@ -39,7 +41,7 @@ _SECONDS_PER_WAIT = 0.02
 SECONDS_PER_CHECK = 0.2
 """Time between two checks whether the page of a run that has ended is still wanted [s]."""
 
-_BEGIN = Engage | Choose | Jaws | End | Begin
+_BEGIN = Engage | Choose | Jaws | End | Begin | CutLines
 """Commands with which a run begins."""
 
 PrepareRun = Callable[[Begin], AbstractContextManager[PreparedRun]]
@@ -141,6 +143,7 @@ class LiveSession:
                 scene.material.toughness,
                 0.0 if scene.blade is None else scene.blade.thickness,
                 asked.is_led,
+                asked.lines,
             )
         is_led, look = asked.is_led and not is_led_by_device, look_of_scene(scene)
         controls = PageControls(self._commands, is_led, choices, look)
@@ -208,7 +211,7 @@ class LiveSession:
             wait,
             lambda: viewer.is_running,
         )
-        return any(isinstance(command, Begin) for command in list(controls.commands))
+        return any(isinstance(command, Begin | CutLines) for command in list(controls.commands))
 
     def _after(self, run: _LiveRun, has_files: bool) -> _LiveRun | None:
         """Wait until the page requests another run, and begin it; None: it is not wanted."""
@@ -233,16 +236,23 @@ class LiveSession:
             while self._viewer.is_running and stop.reason is None:
                 asked, run.controls.next = run.controls.next, None
                 if asked is not None:
-                    return asked
+                    return _as_begin(asked, run.asked)
                 while self._commands:
                     command = self._commands.popleft()
-                    if isinstance(command, Begin):
-                        return command
+                    if isinstance(command, Begin | CutLines):
+                        return _as_begin(command, run.asked)
                     if isinstance(command, Reset) and self._may_choose(run.prepared):
                         return run.asked
                 run.controls.on_wait()
                 time.sleep(SECONDS_PER_CHECK)
         return None
+
+
+def _as_begin(asked: Begin | CutLines, before: Begin) -> Begin:
+    """Return the run that the page requests, which may be that before with other lines."""
+    if isinstance(asked, Begin):
+        return asked
+    return replace(before, lines=asked.lines, is_led=False)
 
 
 def results_of(summary: Summary, folder: Path) -> RunResults:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import msgspec
 
 from bridge import TissueFrame
-from scalpel_sim.hands.commands import Command
+from scalpel_sim.hands.commands import Command, DrawnLine
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.model_shapes import Shape
@@ -44,6 +44,8 @@ class Choices(NamedTuple):
     """Thickness of the blade [m]."""
     is_led: bool
     """Whether the page leads the blade."""
+    lines: Sequence[DrawnLine] = ()
+    """Lines along which the script cuts, as the page has drawn them."""
 
 
 class PageControls(NamedTuple):

@@ -31,6 +31,9 @@ class TriangleMesh(NamedTuple):
     """Factors of the colour between 0 and 1, shape (n_vertices, 3)."""
     levels: Mapping[str, IntArray] = {}
     """Quantities that may be shown as colours, from 0 to 255, by name; shape (n_vertices,) each."""
+    rest: FloatArray | None = None
+    """Where the vertices are in the body at rest [m], shape (n_vertices, 3): for lines that are
+    drawn on it. None: nobody draws."""
 
 
 _N_AROUND = 32

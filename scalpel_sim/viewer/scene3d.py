@@ -176,6 +176,8 @@ class Scene3D:
             attributes["uv"] = _pack(mesh.uv, "float32")
         if mesh.tints is not None:
             attributes["color"] = _pack(mesh.tints * INT16_MAX, "int16", normalized=True)
+        if mesh.rest is not None:
+            attributes["rest"] = _pack(mesh.rest, "float32")
         for name, levels in mesh.levels.items():
             attributes[name] = _pack(levels, "uint8", normalized=True)
         index_type = "uint16" if len(mesh.positions) <= np.iinfo(np.uint16).max else "uint32"

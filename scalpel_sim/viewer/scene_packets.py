@@ -101,6 +101,7 @@ class ScenePackets:
         wireframe: bool = False,
         views: Sequence[ViewTable] = (),
         look: Look = ORGAN_LOOK,
+        is_drawn_on: bool = False,
     ) -> None:
         """Prepare the packets of one run.
 
@@ -110,7 +111,9 @@ class ScenePackets:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             views: Cameras that the page offers besides its own; it begins with the first.
             look: Look of the body's material.
+            is_drawn_on: Whether lines may be drawn on the skin, which takes 12 bytes a vertex.
         """
+        self._is_drawn_on = is_drawn_on
         self._shapes = list(shapes)
         self._frame = frame or TissueFrame()
         self._wireframe = wireframe
@@ -150,8 +153,9 @@ class ScenePackets:
         scene = Scene3D()
         levels, tops = levels_of(state.values)
         textured = map_texture(state.surface, self._diagonal / TILES_PER_BODY, levels, self._look)
-        scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
-        scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
+        skin = textured.skin if self._is_drawn_on else textured.skin._replace(rest=None)
+        scene.set_mesh(f"{TISSUE}/skin", skin, "skin")
+        scene.set_mesh(f"{TISSUE}/cut", textured.cut._replace(rest=None), "cut")
         scene.set_scales(tops)
         for body in self._bodies:
             scene.set_pose(f"/bodies/{body}", *position_and_rotation(state.body_poses[body]))

@@ -301,6 +301,7 @@ def _packets_of(settings: ViewerSettings) -> ScenePackets:
         wireframe=settings.wireframe,
         views=settings.views,
         look=settings.look,
+        is_drawn_on=settings.choices is not None,
     )
 
 

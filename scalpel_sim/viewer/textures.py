@@ -246,6 +246,7 @@ def _in_colours(mesh: TriangleMesh, place: IntArray, tints: FloatArray) -> Trian
         uv=mesh.uv[vertex],
         tints=mesh.tints[vertex] * tints[colour],
         levels={name: values[vertex] for name, values in mesh.levels.items()},
+        rest=None if mesh.rest is None else mesh.rest[vertex],
     )
 
 
@@ -312,6 +313,7 @@ def _textured_triangles(
     return charts.mesh(surface.positions)._replace(
         tints=_tints(surface.rest_positions[charts.nodes] / tile, variation),
         levels={name: values[charts.nodes] for name, values in levels.items()},
+        rest=surface.rest_positions[charts.nodes],
     )
 
 

@@ -26,6 +26,7 @@ _OF_ALL_PAGES = (
     "field_colours.js",
     "smooth.js",
     "see_through.js",
+    "ribbons.js",
     "scene_view.js",
     "coarseness.js",
     "controls.js",
@@ -76,22 +77,22 @@ def live_page(
     if token is None:
         return _page(title, caption, [*scripts, "force_plot.js", "live.js"])
     bars, panels = ["run"], []
-    scripts += ["results.js", "run.js"]
+    scripts += ["results.js", "run.js", "touch.js"]
     if is_led:
         bars.insert(0, "hand")
         scripts += [
             "aim.js",
             "section.js",
             "reach.js",
-            "touch.js",
             "hand_input.js",
             "gamepad.js",
             "instruments.js",
             "hand.js",
         ]
     if choices is not None:
+        bars.append("draw")
         panels.append("choices")
-        scripts.append("choices.js")
+        scripts += ["choices.js", "skin_at_rest.js", "draw.js"]
     return _page(
         title,
         caption,

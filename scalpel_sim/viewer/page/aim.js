@@ -81,7 +81,7 @@ class Aim {
     // Where the tip is to go in turn [m], world frame, for a place of the window.
     at(clientX, clientY) {
         const { tip, into, normal, lead, isBlade, lies, box, isIn } = this.held;
-        const eye = new THREE.Vector3(), way = this.sightThrough(clientX, clientY, eye);
+        const eye = new THREE.Vector3(), way = this.view.sightThrough(clientX, clientY, eye);
         const led = tip.clone().sub(lead).addScaledVector(into, -this.depth);
         const seen = this.bodyOn(eye, way) ?? planeOn(eye, way, led, normal);
         seen.addScaledVector(normal, led.sub(seen).dot(normal));
@@ -111,16 +111,6 @@ class Aim {
     skinOver(place, into) {
         const far = FARTHEST_SIGHT * this.view.extent;
         return this.bodyOn(place.clone().addScaledVector(into, -far), into);
-    }
-
-    // The direction of the line of sight through a place of the window; `eye` becomes its start.
-    sightThrough(clientX, clientY, eye) {
-        const { camera, renderer } = this.viewer;
-        const { left, top, width, height } = renderer.domElement.getBoundingClientRect();
-        camera.updateMatrixWorld();
-        eye.setFromMatrixPosition(camera.matrixWorld);
-        const x = 2 * (clientX - left) / width - 1, y = 1 - 2 * (clientY - top) / height;
-        return new THREE.Vector3(x, y, 0.5).unproject(camera).sub(eye).normalize();
     }
 
     // The ring is where the pointer leads, and a bar goes from there to the tip; at rest the ring is at the tip.

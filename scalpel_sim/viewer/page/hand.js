@@ -56,7 +56,8 @@ class Hand {
 
     // Whether the input of this page leads the blade.
     get isClosed() {
-        return this.run.leads && this.tip !== null && !this.isClutchOpen && !this.hasEnded;
+        const isFree = !this.isClutchOpen && !this.hasEnded && !this.run.isDrawing;
+        return this.run.leads && this.tip !== null && isFree;
     }
 
     // Release, and do not wait for what was requested: the run continues from elsewhere.
@@ -211,6 +212,7 @@ class Hand {
         element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
         element("clutch").textContent = `lead the ${this.instruments.noun}`;
         this.aim.mark.visible = this.isClosed;
+        this.section.line.visible &&= this.isClosed;
         this.reach.enable(this.isClosed);
         this.instruments.enable(this.run.leads && !this.hasEnded);
         element("clutch").disabled = !this.run.leads || this.hasEnded;
@@ -223,6 +225,7 @@ class Hand {
         const { noun } = this.instruments;
         if (this.run.socket === null || this.tip === null) return "";
         if (!this.run.leads) return "Another tab leads the blade.";
+        if (this.run.isDrawing) return "";
         if (this.isClutchOpen) return `Drags turn the view. Space: lead the ${noun} again.`;
         if (this.run.isPaused) return "Time stands still: press \"continue\", or K";
         const isBlade = this.instruments.isClosed === null;

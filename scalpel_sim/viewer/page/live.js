@@ -20,6 +20,7 @@ if (typeof NextRun !== "undefined") {
     run.next = new NextRun(run, CHOICES);
     run.showControls();
 }
+const drawing = typeof Drawing === "undefined" ? null : new Drawing(sceneView, run, CHOICES.lines);
 
 function follow() {
     const socket = new WebSocket(`ws://${location.host}/frames${run ? run.query : ""}`);
@@ -40,6 +41,7 @@ function follow() {
         }
         coarseness.onChange();
         viewer.handle_command_bytearray(new Uint8Array(message.data));
+        if (drawing) drawing.show();
         element("wireframe").checked = sceneView.wireframe;
         afterDrawing((duration) => {
             coarseness.note(duration);

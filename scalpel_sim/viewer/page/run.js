@@ -18,6 +18,8 @@ class Run {
         this.state = null; // in the last picture: see RunState
         this.sentAt = 0; // when something was said last [ms]
         this.next = null; // what the next run is to be
+        this.drawing = null;
+        this.isDrawing = false; // whether a press draws a line: see draw.js
         this.onChange = () => {};
         view.onRun = (state) => this.show(state);
         element("pause").addEventListener("click", () => this.togglePause());
@@ -121,6 +123,7 @@ class Run {
         element("notice").textContent = notice;
         element("notice").hidden = notice === "";
         if (this.next) this.next.showControls();
+        if (this.drawing) this.drawing.showPanel();
         this.results.show(results);
     }
 }

@@ -244,6 +244,16 @@ class SceneView {
         this.lights.aim(new THREE.Vector3(...target), new THREE.Vector3(...eye), extent);
     }
 
+    // The direction of the line of sight through a place of the window; `eye` becomes its start.
+    sightThrough(clientX, clientY, eye) {
+        const { camera, renderer } = this.viewer;
+        const { left, top, width, height } = renderer.domElement.getBoundingClientRect();
+        camera.updateMatrixWorld();
+        eye.setFromMatrixPosition(camera.matrixWorld);
+        const x = 2 * (clientX - left) / width - 1, y = 1 - 2 * (clientY - top) / height;
+        return new THREE.Vector3(x, y, 0.5).unproject(camera).sub(eye).normalize();
+    }
+
     setReadings(readings) {
         const force = new THREE.Vector3(...readings.force);
         const newtons = force.length();
@@ -280,6 +290,7 @@ function geometryOf({ attributes, index }) {
     geometry.userData.levels = {};
     for (const [name, { array, itemSize, normalized }] of Object.entries(attributes)) {
         if (name in QUANTITIES) geometry.userData.levels[name] = array;
+        else if (name === "rest") geometry.userData.rest = array; // no shader reads it
         else geometry.setAttribute(name, new THREE.BufferAttribute(array, itemSize, normalized));
     }
     geometry.userData.tints = geometry.attributes.color;

@@ -2,7 +2,6 @@
 "use strict";
 
 const LOOK_EVERY = 250; // [ms]: a crossing takes a millisecond or two for the surface of an organ
-const LINE_WIDTH = 0.005, LINE_LIFT = 0.004; // over the size of the scene; lifted to the eye, it is not in the skin
 const LINE_COLOUR = 0xffffff;
 
 class Section {
@@ -10,11 +9,7 @@ class Section {
         this.view = view;
         this.lookedAt = -Infinity;
         this.isMissed = false; // whether the plane passes next to the body
-        this.line = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({
-            color: LINE_COLOUR, side: THREE.DoubleSide, transparent: true, opacity: 0.75, depthWrite: false,
-        }));
-        this.line.name = "section";
-        this.line.frustumCulled = false;
+        this.line = band("section", LINE_COLOUR, 0.75);
         view.viewer.scene.add(this.line);
     }
 
@@ -35,8 +30,7 @@ class Section {
         for (const end of ends) end.applyMatrix4(toScene);
         this.isMissed = isMissed; // a body in two halves is on both sides of it
         const eye = scene.worldToLocal(camera.getWorldPosition(new THREE.Vector3()));
-        this.line.geometry.dispose();
-        this.line.geometry = ribbon(ends, eye, this.view.extent);
+        this.line.draw(ribbon(ends, eye, this.view.extent));
     }
 }
 
@@ -60,21 +54,4 @@ function crossings(geometry, plane) {
         }
     }
     return { ends, isMissed: heights.every((height) => height < 0 === heights[0] < 0) };
-}
-
-// Bands along the pieces, which face the eye.
-function ribbon(ends, eye, extent) {
-    const corners = [];
-    for (let i = 0; i < ends.length; i += 2) {
-        const [a, b] = [ends[i], ends[i + 1]];
-        const toEye = eye.clone().sub(a).normalize();
-        const side = b.clone().sub(a).cross(toEye).normalize().multiplyScalar(0.5 * LINE_WIDTH * extent);
-        for (const [end, sign] of [[a, 1], [a, -1], [b, 1], [b, 1], [a, -1], [b, -1]]) {
-            const corner = end.clone().addScaledVector(toEye, LINE_LIFT * extent).addScaledVector(side, sign);
-            corners.push(corner.x, corner.y, corner.z);
-        }
-    }
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
-    return geometry;
 }

@@ -14,6 +14,8 @@ from scalpel_sim.hands.commands import (
     Aim,
     Choose,
     Command,
+    CutLines,
+    DrawnLine,
     End,
     Engage,
     Jaws,
@@ -39,6 +41,7 @@ ALL = [
     Jaws(True),
     Lead(),
     End(),
+    CutLines([DrawnLine([[0.0, 0.01, 0.02]] * 100, [0.0, 0.0, 1.0], 6e-3, 0.03)]),
 ]
 
 ANY_JSON = st.recursive(
