@@ -7,11 +7,12 @@ ENERGY_PLOT = "energy.png"
 INITIAL = "initial.vtu"
 FINAL = "final.vtu"
 REPLAY = "replay.html"
+REPORT = "report.html"
 SCENE = "scene.toml"
 STROKE = "stroke.csv"
 """Motion of the blade in a hand. A scripted run leaves it, and the files of graspers: they may be
 the very ones that are done again."""
-RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
+RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY, REPORT)
 """Names of all files that a run can write, besides `STROKE`."""
 
 REPLAY_FRAMES = "replay.part"

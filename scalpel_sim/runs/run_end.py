@@ -18,12 +18,14 @@ from scalpel_sim.runs.file_names import (
     FORCES,
     PLOT,
     REPLAY,
+    REPORT,
     STROKE,
     SUMMARY,
     grasp_file,
 )
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.runs.run_report import report_of
 from scalpel_sim.scene.label_colours import colours_of_scene
 from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
@@ -127,6 +129,8 @@ def write_end(run: OpenRun) -> Summary:
         add_to(run.replay, simulation)
     with attempts.of(REPLAY):
         outputs.write_replay(run.replay)
+    with attempts.of(REPORT):
+        outputs.write_report(report_of(run.prepared, summary, warnings, run.hand))
     for path in run.prepared.exports:
         with attempts.of(str(path)):
             labels = colours_of_scene(run.prepared.scene)

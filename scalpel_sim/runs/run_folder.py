@@ -12,6 +12,7 @@ import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError, writing
 from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.report_page import RunReport, report_html
 from scalpel_sim.output.summary import Summary, summary_json
 from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.growing_file import FileSum, GrowingFile
@@ -26,6 +27,7 @@ from scalpel_sim.runs.file_names import (
     PLOT,
     REPLAY,
     REPLAY_FRAMES,
+    REPORT,
     RUN_FILES,
     SCENE,
     SUMMARY,
@@ -165,6 +167,11 @@ class Outputs:
         """Write `summary.json`."""
         text = summary_json(summary) + "\n"
         self._write_whole(SUMMARY, lambda path: path.write_text(text, encoding="utf-8"))
+
+    def write_report(self, report: RunReport) -> None:
+        """Write `report.html`."""
+        text = report_html(report)
+        self._write_whole(REPORT, lambda path: path.write_text(text, encoding="utf-8"))
 
     def _write_whole(self, name: str, write: Callable[[Path], object]) -> None:
         """Write a file that appears when it is whole."""

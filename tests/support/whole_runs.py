@@ -37,7 +37,7 @@ def _picture(path: Path) -> None:
         picture.load()
 
 
-def _replay(path: Path) -> None:
+def _page(path: Path) -> None:
     assert path.read_text().rstrip().endswith("</html>")
 
 
@@ -53,6 +53,7 @@ CHECKS: dict[str, Callable[[Path], object]] = {
     "scene.toml": lambda path: tomllib.loads(path.read_text()),
     "force.png": _picture,
     "energy.png": _picture,
-    "replay.html": _replay,
+    "replay.html": _page,
+    "report.html": _page,
 }
 """A check of each file, which raises an error."""
