@@ -1,5 +1,6 @@
 """Images of an arm and of tissue that is cut: colours, depth, and what each pixel shows.
 
+image_files    images as files
 camera         a camera of a simulation, or of a model and tissue of your own
 theatre        what cameras see: a model, its data, and the tissue beside it
 tissue_parts   the surface of a body as textured meshes, one for each label

@@ -1,4 +1,8 @@
-"""OpenGL without a screen."""
+"""OpenGL without a screen.
+
+`mujoco.GLContext` is chosen by `MUJOCO_GL` where MuJoCo is imported, which the program does with
+`disable`, as it opens no window. So contexts are opened here, by the modules that MuJoCo has.
+"""
 
 import importlib
 import os
@@ -7,14 +11,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import mujoco
-
 from scalpel_sim.errors import RunError
 
 RENDERER_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri libgl1"
 """Packages of Debian and Ubuntu that draw without a screen and without a graphics card."""
 
 _BACKEND = "MUJOCO_GL"
+_BACKENDS = ("egl", "osmesa", "glfw", "cgl")
 _THREADS = "LP_NUM_THREADS"
 
 _ONE_THREAD = "1"
@@ -39,25 +42,27 @@ def open_context() -> Any:
         RenderError: there is none; the message says what to install.
     """
     expect_own_process()
-    chosen = os.environ.get(_BACKEND, "").lower().strip()
+    backend = _backend()
     os.environ.setdefault(_THREADS, _ONE_THREAD)
     try:
-        if platform.system() == "Linux" and chosen in ("", "egl"):
-            context = importlib.import_module("mujoco.egl").GLContext(1, 1)
-        elif platform.system() == "Linux" and chosen == "osmesa":
-            context = importlib.import_module("mujoco.osmesa").GLContext(1, 1)
-        else:
-            context = mujoco.GLContext(1, 1)
+        context = importlib.import_module(f"mujoco.{backend}").GLContext(1, 1)
         context.make_current()
     # The libraries that are missing show as any of these.
     except (ImportError, AttributeError, RuntimeError, OSError) as error:
-        wanted = f"with {_BACKEND}={chosen}" if chosen else "by EGL"
         raise RenderError(
-            f"images cannot be drawn: there is no OpenGL {wanted} ({_reason(error)}). On Debian "
-            f"and Ubuntu: apt-get install {RENDERER_PACKAGES}"
+            f"images cannot be drawn: there is no OpenGL by {backend.upper()} ({_reason(error)}). "
+            f"On Debian and Ubuntu: apt-get install {RENDERER_PACKAGES}"
         ) from error
     _opened_in.add(os.getpid())
     return context
+
+
+def _backend() -> str:
+    """Return what opens OpenGL: what `MUJOCO_GL` names, or that of the system."""
+    chosen = os.environ.get(_BACKEND, "").lower().strip()
+    if chosen in _BACKENDS:
+        return chosen
+    return {"Linux": "egl", "Darwin": "cgl"}.get(platform.system(), "glfw")
 
 
 def expect_own_process() -> None:
@@ -78,8 +83,7 @@ def expect_own_process() -> None:
 def chosen_backend() -> Iterator[None]:
     """Make MuJoCo load the functions of the context that `open_context` made."""
     before = os.environ.get(_BACKEND)
-    if platform.system() == "Linux" and not before:
-        os.environ[_BACKEND] = "egl"
+    os.environ[_BACKEND] = _backend()
     try:
         yield
     finally:

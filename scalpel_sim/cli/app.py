@@ -21,6 +21,7 @@ from scalpel_sim.cli.options import (
     TissueOptions,
     expect_no_options,
 )
+from scalpel_sim.cli.snapshot_command import snapshot
 from scalpel_sim.cli.spacemouse_command import spacemouse
 from scalpel_sim.cli.validate_command import perform_case, validate
 from scalpel_sim.cli.view_command import view
@@ -140,6 +141,7 @@ def _run(
 
 
 app.command(view)
+app.command(snapshot)
 app.command(explain)
 app.command(spacemouse)
 app.command(crtk)

@@ -53,6 +53,10 @@ class Health(NamedTuple):
     kernels: dict[str, Any]
     """Where compiled kernels are, how many, and for which scenes."""
     browser: str | None
+    renderer: str | None
+    """OpenGL that draws images; None: there is none."""
+    ffmpeg: str | None
+    """The program that writes films; None: it is not on the PATH."""
     reference_frame_s: float | None
     """Processor time of a frame of the organ's cut: the one number that was measured."""
     real_time_factors: dict[str, float]
@@ -89,9 +93,10 @@ def doctor(*, printing: PrintOptions = PrintOptions()) -> None:
 def examine() -> Health:
     """Return what is there, and measure how fast it is."""
     versions, lacks = _versions()
-    browser = _browser(lacks)
+    browser, ffmpeg = _browser(lacks), _ffmpeg(lacks)
     if any(each.is_needed for each in lacks):
-        return Health(versions, {}, {}, browser, None, {}, lacks)
+        return Health(versions, {}, {}, browser, None, ffmpeg, None, {}, lacks)
+    renderer = _renderer(lacks)
     from scalpel_sim.scene.read import DEFAULT_SCENE
     from scalpel_sim.validate.speed.expected import expected_factors, scene_costs
 
@@ -99,7 +104,7 @@ def examine() -> Health:
     machine = _machine(lacks)
     machine["clock_hz"], reference = _measured(DEFAULT_SCENE in kernels["compiled_for"])
     factors = {} if reference is None else expected_factors(reference, scene_costs())
-    return Health(versions, machine, kernels, browser, reference, factors, lacks)
+    return Health(versions, machine, kernels, browser, renderer, ffmpeg, reference, factors, lacks)
 
 
 def _versions() -> tuple[dict[str, str | None], list[Lack]]:
@@ -135,6 +140,30 @@ def _browser(lacks: list[Lack]) -> str | None:
             "there through `ssh -L PORT:127.0.0.1:PORT`. All else works"
         )
         lacks.append(Lack("no browser is found", cost))
+    return found
+
+
+def _renderer(lacks: list[Lack]) -> str | None:
+    """Return the OpenGL that draws images; None where there is none, which is added."""
+    from scalpel_sim.camera.gl_context import RENDERER_PACKAGES, RenderError, renderer_name
+
+    try:
+        return renderer_name()
+    except RenderError:
+        cost = (
+            "`snapshot`, `film` and cameras do not work; all else does. On Debian and Ubuntu: "
+            f"apt-get install {RENDERER_PACKAGES}"
+        )
+        lacks.append(Lack("no OpenGL is found that draws without a screen", cost))
+        return None
+
+
+def _ffmpeg(lacks: list[Lack]) -> str | None:
+    """Return the ffmpeg on the PATH; None where there is none, which is added."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        cost = "`film` writes an animated PNG, GIF or WebP instead of MP4 or WebM"
+        lacks.append(Lack("no ffmpeg is on the PATH", cost))
     return found
 
 
@@ -254,7 +283,8 @@ def _facts(health: Health) -> list[tuple[str, str]]:
         size = f"{n} compiled, {kernels['bytes'] / _BYTES_PER_MB:.1f} MB, in {kernels['folder']}"
         scenes = f"complete for all scenes but {', '.join(left)}" if left else "for all scenes"
         found.append(("kernels", f"{size}; {scenes}" if kernels["compiled_for"] else size))
-    return [*found, ("browser", health.browser)] if health.browser else found
+    there_too = {"browser": health.browser, "renderer": health.renderer, "ffmpeg": health.ffmpeg}
+    return found + [(name, text) for name, text in there_too.items() if text]
 
 
 def _cells(scene: str, factor: float) -> tuple[str, str]:

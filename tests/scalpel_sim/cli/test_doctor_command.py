@@ -2,8 +2,10 @@
 
 import importlib.metadata
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -16,6 +18,8 @@ from scalpel_sim.runs.warm_up import KernelSet, compile_ahead
 from scalpel_sim.scene.read import DEFAULT_SCENE, SCENES
 from scalpel_sim.validate.speed.expected import as_run, expected_factors, scene_costs
 from tissue.support import cache_directory
+
+ROOT = Path(__file__).parents[3]
 
 HEALTHY = Health(
     versions={"scalpel-sim": "1.2", "python": "3.11.7", "numpy": "2.4.6"},
@@ -35,6 +39,8 @@ HEALTHY = Health(
         "not_compiled_for": ["grid2"],
     },
     browser="/usr/bin/firefox",
+    renderer="llvmpipe, OpenGL 4.5",
+    ffmpeg="/usr/bin/ffmpeg",
     reference_frame_s=0.5e-3,
     real_time_factors=expected_factors(0.5e-3, scene_costs()),
     lacks=[],
@@ -72,7 +78,7 @@ def test_the_page_names_what_is_there_and_fits_the_terminal(width, capsys):
     for words in (
         *("scalpel-sim 1.2", "numpy 2.4.6", "Cray-1, x86-64-v3, 4.0 GHz", "1.5 for this process"),
         *("1200 compiled, 12.3 MB", "/here/kernels", "for all scenes but grid2"),
-        *("/usr/bin/firefox", "0.50 ms", *SCENES),
+        *("llvmpipe, OpenGL 4.5", "/usr/bin/ffmpeg", "/usr/bin/firefox", "0.50 ms", *SCENES),
     ):
         assert words in words_of_text
     assert "missing" not in text
@@ -113,6 +119,20 @@ def test_without_a_browser_it_says_what_does_not_work(capsys, monkeypatch):
     assert code == EXIT_OK and found["browser"] is None
     (lack,) = (each for each in found["lacks"] if "browser" in each["what"])
     assert "replay.html" in lack["cost"]
+    (lack,) = (each for each in found["lacks"] if "ffmpeg" in each["what"])
+    assert found["ffmpeg"] is None and "animated PNG" in lack["cost"]
+
+
+def test_without_a_renderer_it_names_the_packages(tmp_path):
+    """In a process that finds no driver."""
+    code = (
+        "from scalpel_sim.cli import doctor_command as doctor; lacks = []\n"
+        "print(doctor._renderer(lacks), *lacks)"
+    )
+    env = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"}
+    env |= {"__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
+    assert done.stdout.startswith("None") and "libgl1-mesa-dri" in done.stdout
 
 
 def test_a_package_that_is_needed_and_not_there_fails_with_what_to_install(capsys, monkeypatch):
