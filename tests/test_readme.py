@@ -23,6 +23,8 @@ LARGEST_README = 10 * 1024
 HELPS = (
     "run",
     "view",
+    "replay",
+    "export",
     "explain",
     "serve",
     "spacemouse",

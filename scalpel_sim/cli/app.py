@@ -21,6 +21,7 @@ from scalpel_sim.cli.options import (
     TissueOptions,
     expect_no_options,
 )
+from scalpel_sim.cli.recording_commands import export, replay
 from scalpel_sim.cli.snapshot_command import snapshot
 from scalpel_sim.cli.spacemouse_command import spacemouse
 from scalpel_sim.cli.validate_command import perform_case, validate
@@ -142,6 +143,8 @@ def _run(
 
 app.command(view)
 app.command(snapshot)
+app.command(replay)
+app.command(export)
 app.command(explain)
 app.command(spacemouse)
 app.command(crtk)

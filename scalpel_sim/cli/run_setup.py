@@ -17,7 +17,7 @@ from scalpel_sim.cli.options import (
 )
 from scalpel_sim.cli.scene_options import chosen_scene, led_elsewhere, scene_in_file
 from scalpel_sim.errors import Interrupted, RunError, UsageError
-from scalpel_sim.output.export import check_exports
+from scalpel_sim.output.export import check_exports, check_file
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.preparation.prepare import prepare
@@ -30,6 +30,7 @@ from scalpel_sim.runs.prepared_run import PreparedRun, load_kernels
 from scalpel_sim.runs.resumption import Resumption, resumption_of
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.run_folder import check_folder
+from scalpel_sim.saved_run.layout import VTKHDF_SUFFIX
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.read import read_scene
 from scalpel_sim.scene.scene import Scene, changed
@@ -111,6 +112,8 @@ def prepared_run(
                     "--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it"
                 )
             check_exports(options.output.export)
+            if options.output.record is not None:
+                check_file(options.output.record, VTKHDF_SUFFIX, "--record")
             checkpoint_seconds = _checkpoint_seconds(options)
             if client.connect is None:
                 asked = chosen_scene(
@@ -134,6 +137,7 @@ def prepared_run(
             plotter,
             checkpoint_seconds,
             options.output.export,
+            options.output.record,
             client.connect is None,
             options.printing,
         )
@@ -205,7 +209,11 @@ def perform_resumed(folder: Path, options: RunOptions) -> Summary:
     exports = options.output.export
     if resumption.plan is not None and not exports:
         exports = tuple(map(Path, resumption.plan.exports))
-    options = options._replace(output=replace(options.output, out=folder, export=exports))
+    record = options.output.record
+    if record is None and resumption.plan is not None and resumption.plan.record is not None:
+        record = Path(resumption.plan.record)
+    output = replace(options.output, out=folder, export=exports, record=record)
+    options = options._replace(output=output)
     with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
         summary = perform(prepared, resumption=resumption)
         print_report(summary, prepared)

@@ -1,26 +1,28 @@
-"""Export of the body's surface as STL, OBJ, PLY or GLB files, for use in other programs.
+"""Export of the body's surface as STL, OBJ, PLY, GLB or USD files, for use in other programs.
 
-All files are in metres. STL, OBJ and PLY are in the tissue frame, whose z axis points up. GLB is
-turned so that y points up, as the format demands.
+All files are in metres. STL, OBJ, PLY and USD are in the tissue frame, whose z axis points up. GLB
+is turned so that y points up, as the format demands.
 
 - STL: one mesh, all pieces together.
 - PLY: one mesh; each face has a colour, and the properties `is_cut` and `piece`.
 - OBJ: an object for each piece, its faces in the groups `skin` and `cut`.
-- GLB: a node for each piece, with a mesh of its skin and a mesh of its cut faces.
+- GLB and USD: a node for each piece, with a mesh of its skin and a mesh of its cut faces.
 
 Pieces are numbered from 1, the largest at rest first, as in `summary.json`. Of a body with several
 labels each face of a PLY has the colour of its label, and the property `label`; groups of an OBJ
-and meshes of a GLB are one for each label, as `skin_2_fat` and `cut_2_fat`.
+and meshes of a GLB or USD are one for each label, as `skin_2_fat` and `cut_2_fat`.
 """
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from scalpel_sim.errors import UsageError, writing
+from scalpel_sim.output.usd import USD_ENDINGS, UsdPart, expect_usd, usd_bytes
 from scalpel_sim.scene.label_colours import LabelColours
 from tissue import CUT_COLOUR, SKIN_COLOUR, BoolArray, FloatArray, IntArray, Surface
 from tissue.support import whole_file
@@ -29,7 +31,7 @@ if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
     from trimesh import Scene, Trimesh
 
 _GAMMA = 2.2
-"""Exponent between sRGB, in which colours are given, and the linear light that GLB wants."""
+"""Exponent between sRGB, in which colours are given, and the linear light that GLB and USD want."""
 
 _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
 """Transform from z up to y up, the axis that GLB prescribes."""
@@ -73,16 +75,26 @@ def export_surface(surface: Surface, path: Path, labels: Sequence[LabelColours] 
         unfinished.write_bytes(write(surface, labels))
 
 
-def check_exports(paths: Iterable[Path]) -> None:
-    """Make sure before a run that its surface can be exported to these files.
+def check_exports(
+    paths: Iterable[Path], option: str = "--export", endings: Sequence[str] | None = None
+) -> None:
+    """Make sure before the work that a surface can be exported to these files.
+
+    Args:
+        paths: The files.
+        option: The option that chose them, for messages.
+        endings: Endings of names that are known; None: `ENDINGS`.
 
     Raises:
-        UsageError: an ending is none of `ENDINGS`, or there is no such folder.
+        UsageError: an ending is none of these, what writes such a file is not installed, or there
+            is no such folder.
         RunError: the system refuses to write there.
     """
     for path in paths:
-        _check_suffix(path, ENDINGS, "--export")
-        check_file(path, path.suffix.lower(), "--export")
+        _check_suffix(path, ENDINGS if endings is None else endings, option)
+        if path.suffix.lower() in USD_ENDINGS:
+            expect_usd(path)
+        check_file(path, path.suffix.lower(), option)
 
 
 def check_file(path: Path, suffix: str, option: str) -> None:
@@ -225,6 +237,25 @@ def _glb(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
     return _exported(scene, "glb")
 
 
+def _usd(ending: str, surface: Surface, labels: Sequence[LabelColours]) -> bytes:
+    """Return the surface as a USD stage: a transform for each piece, above its parts."""
+    pieces = {
+        name: [
+            UsdPart(part.name, piece.part(part.chosen), _linear(part.colour))
+            for part in _parts(piece, labels)
+        ]
+        for name, piece in surface_pieces(surface)
+    }
+    return usd_bytes(pieces, ending)
+
+
+def _linear(colour: tuple[int, ...]) -> FloatArray:
+    """Return a colour of sRGB, 0 to 255, as linear light from 0 to 1; opacity stays what it is."""
+    linear = np.array(colour) / 255.0
+    linear[:3] **= _GAMMA
+    return linear
+
+
 def _parts(piece: Surface, labels: Sequence[LabelColours]) -> Iterator[_Part]:
     """Yield the parts that a piece has: skin and cut faces, those of each label by themselves."""
     for name, chosen, colour in (
@@ -251,8 +282,7 @@ def _part_mesh(piece: Surface, part: _Part) -> "Trimesh":
 
     mesh = piece.part(part.chosen).to_trimesh()
     mesh.remove_unreferenced_vertices()
-    colour = np.array(part.colour) / 255.0
-    colour[:3] **= _GAMMA
+    colour = _linear(part.colour)
     pbr: Any = material.PBRMaterial
     visuals: Any = texture.TextureVisuals
     mesh.visual = visuals(
@@ -281,6 +311,7 @@ _WRITERS: dict[str, Callable[[Surface, Sequence[LabelColours]], bytes]] = {
     ".obj": _obj,
     ".ply": _ply,
     ".glb": _glb,
+    **{ending: partial(_usd, ending) for ending in USD_ENDINGS},
 }
 """Functions that return the bytes of a file, by the ending of its name."""
 

@@ -36,6 +36,8 @@ class RunPlan(
     """Settings, as the summary has them."""
     seconds: float | None
     """Length of the run [s]; None: as long as a hand leads it."""
+    record: str | None = None
+    """File that it is recorded to."""
     read: dict[str, FileSum] = {}
     """Files of recorded motions that the run repeats, by path seen from its folder."""
 

@@ -111,9 +111,10 @@ class LiveSession:
         with ExitStack() as stack:
             prepared = stack.enter_context(self._prepare(asked))
             if self._n_runs:
-                folder = prepared.folder
+                folder, record, end = prepared.folder, prepared.record, f"-{self._n_runs + 1}"
                 prepared = prepared._replace(
-                    folder=folder.with_name(f"{folder.name}-{self._n_runs + 1}")
+                    folder=folder.with_name(folder.name + end),
+                    record=record and record.with_stem(record.stem + end),
                 )
             simulation, device = prepared.simulation, None
             self._commands.clear()

@@ -75,8 +75,13 @@ class OutputOptions:
     out: Path | None = None
     "Folder for the files [default: out/SCENE]."
     export: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = ()
-    """Write the body's surface after the run to this file too: .glb, .obj (pieces and cut faces by
-    name), .ply (marked on each face) or .stl (triangles alone). May be given several times."""
+    """Write the body's surface after the run to this file too: .glb, .obj, .usd, .usda, .usdc
+    (pieces and cut faces by name), .ply (marked on each face) or .stl (triangles alone). May be
+    given several times."""
+    record: Path | None = None
+    """Write the run to this FILE.vtkhdf too, 25 steps a second: body, stress, strain, labels, age
+    of cuts, arm and forces. ParaView plays it, and so does scalpel-sim replay; it is whole however
+    the run ends."""
     checkpoint: float | None = None
     """Every so many seconds of simulated time the whole run is written to its folder, so that one
     that was killed can continue (run --resume); 0: never [default: 1]."""
@@ -89,8 +94,8 @@ class RunOutputOptions(OutputOptions):
 
     resume: Path | None = None
     """Continue the run that was interrupted, or killed, while it wrote to this folder, to the
-    same bits. What is requested is in the folder: give no other options than --export,
-    --checkpoint, --strict, and what is printed."""
+    same bits, and its recording too. What is requested is in the folder: give no other options than
+    --export, --record, --checkpoint, --strict, and what is printed."""
     strict: Flag = False
     """End with exit code 4 where the run ended with a warning: a cut that is unfinished, a blade
     that is still in the tissue, an account that does not close."""

@@ -30,6 +30,8 @@ class PreparedRun(NamedTuple):
     """Simulated time between two checkpoints [s]; 0: there are none."""
     exports: tuple[Path, ...] = ()
     """Files for the body's surface after the run."""
+    record: Path | None = None
+    """File that the run is recorded to; None: there is none."""
     is_here: bool = True
     """Whether the tissue is in this process."""
     printing: PrintOptions = PrintOptions()

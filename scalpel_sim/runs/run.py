@@ -143,7 +143,8 @@ def perform(
         with RunCheckpoints(run, plan) as checkpoints:
             if controls is not None:
                 controls.history.begin(checkpoints, outputs, replay)
-            _wait(before_frames, outputs)
+            run.begin_recording(None if hand is not None else seconds)
+            _wait(before_frames, run)
             if controls is not None:
                 controls.pace.go_on()
             calls = [each for each in (advance, every_frame) if each is not None]
@@ -191,15 +192,18 @@ def _raise_what_ended_it(
         raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
 
 
-def _wait(before_frames: Callable[[], None] | None, outputs: Outputs) -> None:
+def _wait(before_frames: Callable[[], None] | None, run: OpenRun) -> None:
     """Call what is to be done before the first frame; remove the first files where it fails."""
     if before_frames is None:
         return
     try:
         before_frames()
     except BaseException:
-        outputs.free_reserve()
-        outputs.remove_earlier_files()
+        if run.recorder is not None:
+            run.recorder.close()
+            run.recorder.path.unlink()
+        run.outputs.free_reserve()
+        run.outputs.remove_earlier_files()
         raise
 
 
@@ -232,7 +236,9 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
         outputs.write_scene(text)
     exports = [str(path.absolute()) for path in run.prepared.exports]
     read = {} if scene is None or hand is not None else _sums_of_recorded(scene, outputs)
-    plan = RunPlan(simulation.dt, text, exports, run.settings, seconds, read)
+    record = run.prepared.record
+    path = None if record is None else str(record.absolute())
+    plan = RunPlan(simulation.dt, text, exports, run.settings, seconds, path, read)
     outputs.begin_journal(plan)
     if outputs.resumption is None:
         _write_initial(run)

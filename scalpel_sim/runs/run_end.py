@@ -26,6 +26,7 @@ from scalpel_sim.runs.file_names import (
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.run_report import report_of
+from scalpel_sim.saved_run.recorder import RunRecorder
 from scalpel_sim.scene.label_colours import colours_of_scene
 from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
@@ -89,12 +90,33 @@ class OpenRun:
         """The body before the first frame."""
         self.first_deformation: Deformation = link.deformation()
         """Its stress and strain then."""
+        self.recorder: RunRecorder | None = None
+        """Records it, if that is requested."""
         self.status = COMPLETE
         """`complete`, or what ended the run before its time."""
         self.failure: Exception | None = None
         """Error that ended the frames."""
         self.attempts = Attempts()
         """Attempts to write the last files."""
+
+    def begin_recording(self, seconds: float | None) -> None:
+        """Begin to record the run, if that is requested, at its start or where it continues.
+
+        Args:
+            seconds: How long it is to last [s]; None: as long as a hand leads.
+
+        Raises:
+            RunError: the system refuses.
+        """
+        prepared = self.prepared
+        if prepared.record is not None:
+            self.recorder = RunRecorder(
+                prepared.simulation,
+                prepared.record,
+                prepared.scene if prepared.is_here else None,
+                seconds=seconds,
+                continues=self.outputs.resumption is not None,
+            )
 
 
 def write_end(run: OpenRun) -> Summary:
@@ -114,6 +136,9 @@ def write_end(run: OpenRun) -> Summary:
             write_driven(outputs, run.hand)
     with attempts.of(FORCES):
         outputs.write_pending()
+    if run.recorder is not None:
+        with attempts.of(str(run.recorder.path)):
+            run.recorder.close()
     outcome, warnings = _outcome(run), list[RunWarning]()
     if outcome.last is not None and outcome.report is not None:
         with attempts.of("the warnings"):

@@ -176,7 +176,9 @@ class LaidOutFile:
             self._show_steps(lengths[STEP_TIMES])
         for name, length in lengths.items():
             if name != STEP_TIMES and length != self._shown[name]:
-                shape = (length, *self._tables[name].width)
+                table = self._tables[name]
+                # HDF5 takes nothing of no length that has a place: an empty table shows a row.
+                shape = (max(length, min(table.room, 1)), *table.width)
                 self._write(
                     self._places[name].shape, struct.pack(f"<{2 * len(shape)}q", *shape, *shape)
                 )

@@ -3,13 +3,15 @@
 import json
 import logging
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from scalpel_sim.errors import UsageError
+from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.saved_run.body_writer import BodyWriter
 from scalpel_sim.saved_run.growing_tables import GrowingTables
 from scalpel_sim.saved_run.instant import contact_rows, poses_and_forces
@@ -92,7 +94,7 @@ class RunRecorder:
         try:
             if continues:
                 self._continue()
-            if not self._ends or self._ends[-1][0] < simulation.n_frames:
+            if not self._ends:
                 self._add(simulation.n_frames)
         except BaseException:
             self._file.close()
@@ -147,11 +149,21 @@ class RunRecorder:
             self._add(n_frames)
 
     def _add(self, n_frames: int) -> None:
-        """Write a step: the body, the arm, and the rows of the frames before.
+        """Write a step; of one that is not written whole nothing stays.
 
         Args:
             n_frames: Number of frames that were done.
         """
+        try:
+            self._write(n_frames)
+        except BaseException:
+            if self._ends:
+                with suppress(RunError):
+                    self._take_off(self._ends[-1][1])
+            raise
+
+    def _write(self, n_frames: int) -> None:
+        """Write a step: the body, the arm, and the rows of the frames before."""
         simulation, file = self._simulation, self._file
         time = n_frames * simulation.dt
         self._body.add(simulation.link, time)
@@ -188,7 +200,11 @@ class RunRecorder:
             return
         while len(self._ends) > 1 and self._ends[-1][0] > n_frames:
             self._ends.pop()
-        self._file.cut_back(self._ends[-1][1])
+        self._take_off(self._ends[-1][1])
+
+    def _take_off(self, lengths: Sequence[int]) -> None:
+        """Take off all that was added since the tables had these lengths."""
+        self._file.cut_back(lengths)
         self._body.begin_again(self.path)
 
     def _continue(self) -> None:

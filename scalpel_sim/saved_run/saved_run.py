@@ -166,7 +166,13 @@ class SavedRun:
 
         The last step may have a frame more than rows: of a frame that is drawn there is none yet.
         """
-        return np.asarray(self._file[f"{OWN}/{ROWS}"][:])
+        return np.asarray(self._file[f"{OWN}/{ROWS}"][: self._n_rows])
+
+    @property
+    def _n_rows(self) -> int:
+        """Number of rows. Of a run that has not ended an empty table shows one."""
+        n_shown = len(self._file[f"{OWN}/{ROWS}"])
+        return n_shown if n_shown > 1 else int(self._own("steps/rows", -1))
 
     def column(self, name: str) -> FloatArray:
         """Return one column of `rows`, shape (n_frames,).
@@ -176,7 +182,7 @@ class SavedRun:
         """
         if name not in self.columns:
             raise unknown("column", name, self.columns)
-        return np.asarray(self._file[f"{OWN}/{ROWS}"][:, self.columns.index(name)])
+        return np.asarray(self._file[f"{OWN}/{ROWS}"][: self._n_rows, self.columns.index(name)])
 
     def at(self, time: float) -> SavedStep:
         """Return the last step that is not after a time [s].

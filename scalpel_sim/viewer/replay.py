@@ -15,7 +15,7 @@ from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.messages import SceneState
-from scalpel_sim.viewer.model_shapes import shapes_of
+from scalpel_sim.viewer.model_shapes import Shape, shapes_of
 from scalpel_sim.viewer.page import replay_page
 from scalpel_sim.viewer.scene_packets import ScenePackets
 
@@ -51,7 +51,7 @@ class ReplayWriter:
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | Sequence[Shape],
         *,
         title: str = "scalpel_sim",
         frame: TissueFrame | None = None,
@@ -63,7 +63,7 @@ class ReplayWriter:
         """Prepare a replay.
 
         Args:
-            model: MuJoCo model whose shapes are shown.
+            model: MuJoCo model whose shapes are shown, or these shapes.
             title: Heading of the page.
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
@@ -165,7 +165,8 @@ class ReplayWriter:
     def _elements(self) -> Iterator[str]:
         """Yield the script elements that hold the run: the opening packet, then the frames."""
         # The shapes are made here and not at the start, which loading trimesh would delay by 0.3 s.
-        shapes = shapes_of(self._model)
+        is_model = isinstance(self._model, mujoco.MjModel)
+        shapes = shapes_of(self._model) if is_model else self._model
         packets = ScenePackets(
             shapes,
             self._tissue_frame,

@@ -58,11 +58,11 @@ def at(n_frames):
     return kill
 
 
-def perform_in(folder, scene, simulation=None, resumption=None, **others):
-    """Do a run in a folder."""
+def perform_in(folder, scene, simulation=None, resumption=None, record=None, **others):
+    """Do a run in a folder, and record it to a file."""
     simulation, settings = simulation or prepare(scene), {"scene": scene.name}
     with Plotter() as plotter:
-        prepared = PreparedRun(simulation, scene, folder, settings, plotter, EVERY)
+        prepared = PreparedRun(simulation, scene, folder, settings, plotter, EVERY, record=record)
         return perform(prepared, resumption=resumption, **others)
 
 

@@ -20,7 +20,7 @@ BLOCK = block((4, 2, 2), (0.04, 0.02, 0.02))
 FULL, SINGLE = 1e-9, 1e-5
 """Relative error of volumes in formats with full and with single precision."""
 
-PRECISION = {".obj": FULL, ".stl": SINGLE, ".ply": SINGLE, ".glb": SINGLE}
+PRECISION = {ending: FULL if ending == ".obj" else SINGLE for ending in ENDINGS}
 
 
 class Body(NamedTuple):
@@ -81,11 +81,39 @@ def exported(body: Body, folder: Path, ending: str) -> trimesh.Trimesh:
 
 def exported_mesh(path: Path) -> trimesh.Trimesh:
     """Read a file as one mesh whose parts share their vertices."""
-    read = trimesh.load(path)
+    read = usd_scene(path) if path.suffix.startswith(".usd") else trimesh.load(path)
     if isinstance(read, trimesh.Scene):
         read = read.to_geometry()
         read.merge_vertices(merge_tex=True, merge_norm=True)
     return read
+
+
+def usd_scene(path: Path) -> trimesh.Scene:
+    """Read a stage of USD: a mesh for each part, with its colour of linear light."""
+    from pxr import Usd, UsdGeom, UsdShade
+
+    stage, scene = Usd.Stage.Open(str(path)), trimesh.Scene()
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0 and UsdGeom.GetStageUpAxis(stage) == "Z"
+    assert stage.GetDefaultPrim().GetPath() == "/body"
+    for prim in stage.Traverse():
+        if not prim.IsA(UsdGeom.Mesh):
+            continue
+        mesh, material = (
+            UsdGeom.Mesh(prim),
+            UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(),
+        )
+        assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
+        points = np.array(mesh.GetPointsAttr().Get())
+        extent = [points.min(axis=0), points.max(axis=0)]
+        np.testing.assert_allclose(np.array(mesh.GetExtentAttr().Get()), extent, rtol=1e-6)
+        assert set(mesh.GetFaceVertexCountsAttr().Get()) == {3}
+        faces = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+        shader, _, _ = material[0].ComputeSurfaceSource()
+        colour = np.array(shader.GetInput("diffuseColor").Get())
+        assert np.array_equal(mesh.GetDisplayColorAttr().Get()[0], colour)
+        part = trimesh.Trimesh(points, faces, process=False, metadata={"colour": colour})
+        scene.add_geometry(part, geom_name=f"{prim.GetParent().GetName()}_{prim.GetName()}")
+    return scene
 
 
 def assert_is_closed(mesh: trimesh.Trimesh) -> None:
@@ -201,7 +229,7 @@ def test_a_ply_marks_each_face_with_its_piece_and_whether_it_is_of_a_cut(tmp_pat
 
 
 def test_another_ending_is_refused_with_the_known_ones(tmp_path):
-    with pytest.raises(UsageError, match=r"must end in \.stl, \.obj, \.ply or \.glb"):
+    with pytest.raises(UsageError, match=r"must end in \.stl, \.obj, \.ply, \.glb, \.usd"):
         export_surface(Tissue(BLOCK).surface(), tmp_path / "body.dae")
 
 
@@ -213,7 +241,7 @@ def test_a_run_exports_the_body_to_each_file_that_is_asked_for(tmp_path):
     files = [tmp_path / f"body{ending}" for ending in (*ENDINGS, ".STL")]
     options = [word for file in files for word in ("--export", str(file))]
     assert run("--out", str(tmp_path / "out"), *options) == 0
-    assert all(trimesh.load(file).area > 0.0 for file in files)
+    assert all(exported_mesh(file).area > 0.0 for file in files)
 
 
 def test_the_report_of_a_run_names_what_was_exported(tmp_path, capsys):
@@ -226,8 +254,8 @@ def test_the_report_of_a_run_names_what_was_exported(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("body.txt", "must end in .stl, .obj, .ply or .glb"),
-        ("body", "must end in .stl, .obj, .ply or .glb"),
+        ("body.txt", "must end in .stl, .obj, .ply, .glb, .usd, .usda or .usdc"),
+        ("body", "must end in .stl, .obj, .ply, .glb, .usd, .usda or .usdc"),
         ("nowhere/body.stl", "there is no folder"),
     ],
 )
@@ -269,8 +297,8 @@ def test_faces_of_a_ply_have_the_label_and_its_colour(tmp_path):
         assert chosen.any() and (read.visual.face_colors[chosen][:, :3] == colour).all()
 
 
-@pytest.mark.parametrize("ending", [".obj", ".glb"])
-def test_groups_of_an_obj_and_meshes_of_a_glb_are_one_for_each_label(ending, tmp_path):
+@pytest.mark.parametrize("ending", [".obj", ".glb", ".usda", ".usdc"])
+def test_groups_of_an_obj_and_meshes_of_a_glb_or_usd_are_one_for_each_label(ending, tmp_path):
     surface, path = labelled_surface(), tmp_path / f"two{ending}"
     export_surface(surface, path, LABELS)
     names = [
@@ -283,8 +311,11 @@ def test_groups_of_an_obj_and_meshes_of_a_glb_are_one_for_each_label(ending, tmp
         found = [line[2:] for line in path.read_text().splitlines() if line.startswith("g ")]
         assert found == names
     else:
-        scene = trimesh.load(path)
+        scene = trimesh.load(path) if ending == ".glb" else usd_scene(path)
         assert sorted(scene.geometry) == sorted(names)
-        fat = scene.geometry["piece_1_cut_3_fat"].visual.material.baseColorFactor
-        np.testing.assert_allclose(fat[:3] / 255.0, [0.875, 0.536, 0.0], atol=0.01)
+        part = scene.geometry["piece_1_cut_3_fat"]
+        fat = part.metadata.get("colour")
+        if ending == ".glb":
+            fat = part.visual.material.baseColorFactor[:3] / 255.0
+        np.testing.assert_allclose(fat, [0.875, 0.536, 0.0], atol=0.01)
     assert_is_closed(exported_mesh(path))
