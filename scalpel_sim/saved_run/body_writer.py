@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge import TissueLink
+from scalpel_sim.saved_run.cut_times import CutTimes
 from scalpel_sim.saved_run.growing_tables import GrowingTables
 from scalpel_sim.saved_run.layout import (
     CELL_FIELDS,
@@ -26,7 +27,7 @@ from scalpel_sim.saved_run.layout import (
     field_offsets,
     field_table,
 )
-from tissue import BoolArray, FloatArray, IntArray, Snapshot, Surface, piece_of_tetrahedra
+from tissue import IntArray, Snapshot, piece_of_tetrahedra
 
 _TETRAHEDRON = 10
 """VTK's number for a tetrahedron with four nodes."""
@@ -46,7 +47,7 @@ class BodyWriter:
         self._file = file
         self._written: dict[str, tuple[bytes, int]] = {}  # the last rows, and where they begin
         self._forget_mesh()
-        self._first_cut: FloatArray = np.empty(0)
+        self._cuts = CutTimes()
 
     def _forget_mesh(self) -> None:
         self._tetrahedra: IntArray = np.empty((0, 4), np.int64)
@@ -65,7 +66,7 @@ class BodyWriter:
         self._forget_mesh()
         with h5py.File(path) as file:
             first, count = file[f"{OWN}/steps/first_cut"][-1]
-            self._first_cut = file[f"{OWN}/first_cut"][first : first + count]
+            self._cuts.begin_again(file[f"{OWN}/first_cut"][first : first + count])
 
     def add(self, link: TissueLink, time: float) -> None:
         """Add the body as it is now.
@@ -78,7 +79,8 @@ class BodyWriter:
         if len(snapshot.positions) != self._n_points or not np.array_equal(
             snapshot.tetrahedra, self._tetrahedra
         ):
-            self._begin_mesh(snapshot, surface, time)
+            self._begin_mesh(snapshot)
+        self._cuts.update(link, snapshot, surface, time)
         file = self._file
         file.append(PART_OFFSETS, file.length(f"{VTK}/{COUNTS[0]}") - 1)
         file.append(N_PARTS, 1)
@@ -88,7 +90,7 @@ class BodyWriter:
         stress, strain = (each.reshape(-1, 9) for each in (deformation.stress, deformation.strain))
         fields: dict[str, npt.NDArray[np.generic]] = {
             "velocity": snapshot.velocities,
-            "cut_age": time - self._first_cut,
+            "cut_age": time - self._cuts.times,
             "rest_position": snapshot.rest_positions,
             "mass": snapshot.masses,
             "fixed": snapshot.fixed,
@@ -111,23 +113,18 @@ class BodyWriter:
             "surface/triangles": surface.triangles,
             "surface/is_cut": surface.is_cut,
             "surface/labels": no_labels if surface.labels is None else surface.labels,
-            "first_cut": self._first_cut,
+            "first_cut": self._cuts.times,
         }
         for name, kind, _ in SURFACE_FIELDS:
             file.append(
                 f"{OWN}/steps/{name}", self._shared(f"{OWN}/{name}", skin[name].astype(kind))
             )
 
-    def _begin_mesh(self, snapshot: Snapshot, surface: Surface, time: float) -> None:
-        """Write another mesh, and note which nodes are on faces of a cut by now."""
+    def _begin_mesh(self, snapshot: Snapshot) -> None:
+        """Write another mesh."""
         file, tetrahedra = self._file, snapshot.tetrahedra
         self._tetrahedra, self._n_points = tetrahedra, len(snapshot.positions)
         self._pieces = piece_of_tetrahedra(snapshot)
-        known = self._first_cut[: self._n_points]
-        first_cut = np.full(self._n_points, np.nan)
-        first_cut[: len(known)] = known
-        first_cut[_are_on_cut(snapshot, surface) & np.isnan(first_cut)] = time
-        self._first_cut = first_cut
         for name, count in zip(
             COUNTS, (self._n_points, len(tetrahedra), tetrahedra.size), strict=True
         ):
@@ -142,17 +139,3 @@ class BodyWriter:
         if name not in self._written or self._written[name][0] != content:
             self._written[name] = content, self._file.append(name, rows)
         return self._written[name][1], len(rows)
-
-
-def _are_on_cut(snapshot: Snapshot, surface: Surface) -> BoolArray:
-    """Return which nodes are on a face of a cut, shape (n_nodes,).
-
-    A surface does not say which nodes its vertices are: they are those at the same place.
-    """
-    vertices = np.unique(surface.triangles[surface.is_cut])
-    on_cut = {
-        place.tobytes()
-        for place in np.hstack([surface.positions[vertices], surface.rest_positions[vertices]])
-    }
-    places = np.hstack([snapshot.positions, snapshot.rest_positions])
-    return np.array([place.tobytes() in on_cut for place in places])

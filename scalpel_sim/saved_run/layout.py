@@ -65,8 +65,8 @@ POINT_FIELDS = (
     Field("mass", "f4"),
     Field("fixed", "u1"),
 )
-"""Quantities of nodes: velocity [m/s]; time since the node was first seen on a face of a cut [s],
-NaN before; position in the body at rest [m]; mass [kg]; whether it is held, 0 or 1."""
+"""Quantities of nodes: velocity [m/s]; time since the node is on a face of a cut [s], NaN where
+it is on none; position in the body at rest [m]; mass [kg]; whether it is held, 0 or 1."""
 
 CELL_FIELDS = (
     Field("stress", "f4", (9,)),
@@ -102,7 +102,7 @@ SURFACE_FIELDS = (
 )
 """The surface that pages draw: positions of its vertices, now and at rest [m], what
 `Tissue.surface_values` has at them; triangles, whether each is a face of a cut, and its label (none
-of a body with one). Then when each node was first seen on a face of a cut [s], NaN before."""
+of a body with one). Then since when each node is on a face of a cut [s]; NaN: it is on none."""
 
 CONTACTS = Field("contacts", "f8", (6,))
 """Points at which the tissue acts on the blade [m] and the forces on it there [N], world frame."""

@@ -27,7 +27,7 @@ class SavedStep(NamedTuple):
     deformation: Deformation
     """Stress and strain of the tetrahedra."""
     cut_age: FloatArray
-    """Time since a node was first seen on a face of a cut [s], to a step; NaN: it is on none."""
+    """Time since which each node is on a face of a cut [s]; NaN: it is on none."""
     surface: Surface
     """The surface, tissue frame."""
     surface_values: Mapping[SurfaceQuantity, FloatArray]

@@ -122,16 +122,30 @@ def test_colours_of_a_step_are_those_of_the_tissue(recorded, run):
         assert found == pytest.approx(values, rel=1e-6, abs=1e-8)
 
 
-def test_the_age_of_a_cut_begins_where_its_node_is_first_seen_on_a_face(run):
-    times = np.full(0, np.nan)
-    for i in range(len(run)):
-        step = run.step(i)
+def test_the_age_of_a_cut_begins_in_the_frame_that_opens_a_face_at_its_node(recorded, run):
+    tissue = recorded[2].link.tissue
+    faces, last = tissue.cut_faces(), run.step(-1)
+    expected = np.full(len(last.cut_age), np.nan)
+    snapshot = tissue.snapshot()
+    for corners, time in zip(faces.corners[::-1], faces.times[::-1], strict=True):
+        for corner in corners:  # the first face overwrites what later ones wrote
+            expected[(snapshot.rest_positions == corner).all(axis=1)] = time
+    on_cut = ~np.isnan(last.cut_age)
+    assert on_cut.any() and len(np.unique(last.cut_age[on_cut])) > 5
+    assert last.cut_age[on_cut] == pytest.approx(last.time - expected[on_cut], abs=1e-6)
+    assert np.isnan(run.step(0).cut_age).all()
+
+
+def test_a_node_is_on_a_cut_from_one_step_on_and_keeps_its_number(run):
+    before = run.step(0)
+    for i in range(1, len(run)):
+        step, n = run.step(i), len(before.cut_age)
+        assert np.array_equal(step.snapshot.rest_positions[:n], before.snapshot.rest_positions)
         cut = step.surface.positions[np.unique(step.surface.triangles[step.surface.is_cut])]
         is_cut = (step.snapshot.positions[:, None] == cut).all(axis=2).any(axis=1)
-        times = np.append(times, np.full(len(step.cut_age) - len(times), np.nan))
-        times[is_cut & np.isnan(times)] = step.time
-        assert step.cut_age == pytest.approx(step.time - times, abs=1e-6, nan_ok=True)
-    assert np.nanmin(times) > 0.0
+        assert np.array_equal(~np.isnan(step.cut_age), is_cut)
+        assert np.nanmax(step.cut_age[:n][np.isnan(before.cut_age)], initial=0.0) < 0.04
+        before = step
 
 
 def test_a_step_is_found_by_its_time(run):
