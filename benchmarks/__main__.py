@@ -9,6 +9,7 @@ from cyclopts import App, CycloptsError, Parameter
 from benchmarks.costs import checked_steps, saved_state, surface_values, undo
 from benchmarks.device_link import device_link
 from benchmarks.frame import fixed_cost, frame
+from benchmarks.images import images
 from benchmarks.links import lag, round_trip
 from benchmarks.peers.benchmark import peers
 from benchmarks.real_time import real_time
@@ -51,6 +52,7 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "checked-steps": checked_steps,
     "saved-state": saved_state,
     "surface-values": surface_values,
+    "images": images,
     "undo": undo,
     "round-trip": round_trip,
     "device-link": device_link,
