@@ -1,5 +1,8 @@
 """Images of an arm and of tissue that is cut: colours, depth, and what each pixel shows.
 
+film           the pictures of a film
+film_files     films as files
+force_panel    a plot beside a film
 image_files    images as files
 camera         a camera of a simulation, or of a model and tissue of your own
 theatre        what cameras see: a model, its data, and the tissue beside it

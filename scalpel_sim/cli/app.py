@@ -13,6 +13,7 @@ from scalpel_sim.cli.check_command import check
 from scalpel_sim.cli.crtk_command import crtk
 from scalpel_sim.cli.doctor_command import doctor
 from scalpel_sim.cli.explain_command import explain
+from scalpel_sim.cli.film_command import film
 from scalpel_sim.cli.mesh_command import mesh
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
@@ -143,6 +144,7 @@ def _run(
 
 app.command(view)
 app.command(snapshot)
+app.command(film)
 app.command(replay)
 app.command(export)
 app.command(explain)

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
+from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.options import OUTPUT, Flag
 
 CAMERA = Group("Camera", sort_key=6)
@@ -48,3 +49,29 @@ class ImageOptions:
         """The files that are wanted, by option."""
         given = {"output": self.output, "depth": self.depth, "segmentation": self.segmentation}
         return {option: path for option, path in given.items() if path is not None}
+
+
+@Parameter(name="*", group=CAMERA)
+@dataclass(frozen=True)
+class FilmOptions:
+    """The pace of a film, and what is beside it."""
+
+    fps: float = 25.0
+    "Pictures in a second of film."
+    slow: float = 1.0
+    "Slow motion: the film takes so many times as long as what it shows."
+    plot: Flag = False
+    "Plot force and cut area beside the pictures."
+
+    def check(self) -> None:
+        """Refuse a pace that no film has.
+
+        Raises:
+            UsageError: it is beyond its bounds.
+        """
+        for option, value, (least, most) in (
+            ("--fps", self.fps, (1.0, 120.0)),
+            ("--slow", self.slow, (0.01, 1000.0)),
+        ):
+            if not least <= value <= most:
+                raise UsageError(f"{option} is {value:g}; it must be from {least:g} to {most:g}")
