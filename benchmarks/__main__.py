@@ -6,10 +6,9 @@ from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from benchmarks.costs import checked_steps, saved_state, surface_values, undo
+from benchmarks.costs import checked_steps, images, saved_state, surface_values, undo
 from benchmarks.device_link import device_link
 from benchmarks.frame import fixed_cost, frame
-from benchmarks.images import images
 from benchmarks.links import lag, round_trip
 from benchmarks.peers.benchmark import peers
 from benchmarks.real_time import real_time

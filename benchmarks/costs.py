@@ -1,4 +1,4 @@
-"""Costs around the frames of a scene: states, checks, surfaces, undo."""
+"""Costs around the frames of a scene: states, checks, surfaces, images, undo."""
 
 import tempfile
 import time
@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from benchmarks.frame import Stopwatches
-from benchmarks.timing import time_calls
+from benchmarks.timing import Rounds, TurnWatch, time_calls
 from bridge import InProcessLink
-from scalpel_sim import Simulation, prepare
+from scalpel_sim import Camera, Simulation, prepare
 from scalpel_sim.hands.commands import Engage, Move, Release, Undo
 from scalpel_sim.hands.run_controls import History, Pace, RunControls
 from scalpel_sim.hands.teleoperation import LiveHand
@@ -22,13 +22,23 @@ from scalpel_sim.runs.options import Flag
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import changed
+from scalpel_sim.simulation import no_garbage_collection
 from scalpel_sim.validate.speed.measurements import CPU, LOWER, WALL, BenchmarkResult
 from scalpel_sim.validate.speed.tables import Rows
+from scalpel_sim.validate.speed.watch import SILENT
 from tissue import (
     SurfaceQuantity,
     Tissue,
     TissueState,
 )
+
+_CONTROL_FRAMES = 20
+"""Frames of a control step: an image is taken after each."""
+
+_IMAGES_FROM, _IMAGES_TO = 0.4, 1.2
+"""Time in which images are taken [s]: as the organ is cut."""
+
+_OF_IMAGES = ("20 ms of simulation", "image", "a further camera", "depth", "all three")
 
 _DRAWN = 0.035
 """Distance by which a hand draws the blade in each stroke [m]."""
@@ -134,6 +144,73 @@ def surface_values(scene: str = "organ", /, *, times: int = 100) -> BenchmarkRes
     for case, do in cases.items():
         rows.times(case, tissue.n_tetrahedra, [time_calls(do, times)])
     return rows.table(f"surface of {scene}", "In mid-cut.")
+
+
+def images(
+    scene: str = "organ",
+    /,
+    *,
+    side: int = 128,
+    runs: Rounds = 5,
+    watch: TurnWatch = SILENT,
+) -> BenchmarkResult:
+    """Time images of a cut, and the simulation between them, in turns: CPU time, all threads.
+
+    Args:
+        scene: Scene.
+        side: Width and height of the images [pixels].
+        runs: Number of times that the same part of the cut is done.
+        watch: Receives the progress.
+    """
+    taken: dict[str, list[list[float]]] = {case: [] for case in _OF_IMAGES}
+    watch.begin(runs)
+    size = 0
+    for _ in range(runs):
+        simulation = prepare(scene_called(scene), records=False)
+        camera = Camera(simulation, "overview", width=side, height=side)
+        further = camera.another("endoscope")
+        simulation.run(_IMAGES_FROM)
+        for each in (camera, further):
+            each.image()
+        for samples in taken.values():
+            samples.append([])
+
+        def timed(case: str, do: Callable[[], Any]) -> None:
+            begin = time.process_time()
+            do()
+            taken[case][-1].append(time.process_time() - begin)
+
+        def control_step(now: Any = simulation) -> None:
+            for _ in range(_CONTROL_FRAMES):
+                now.step()
+
+        with camera, no_garbage_collection():
+            while simulation.time < _IMAGES_TO:
+                timed("20 ms of simulation", control_step)
+                timed("image", camera.rgb)
+                timed("a further camera", further.rgb)
+                timed("20 ms of simulation", control_step)
+                timed("all three", camera.image)
+                timed("depth", further.depth)
+        size = simulation.result.n_tetrahedra
+        watch.tick(scene)
+    rows = Rows("images", CPU)
+    for case, rounds in taken.items():
+        rows.times(case, size, [np.array(samples) for samples in rounds])
+    simulated = np.array([np.median(samples) for samples in taken["20 ms of simulation"]])
+    for case in _OF_IMAGES[1:]:
+        shares = 100.0 * np.array([np.median(samples) for samples in taken[case]]) / simulated
+        title = f"{case}, over 20 ms of simulation"
+        rows.values(
+            title, size, shares.tolist(), "%", quantity="share", better=LOWER, clock=CPU.name
+        )
+    about = (
+        f"{scene} as it is cut, {side} x {side} pixels, by {camera.renderer}. `image` is colours "
+        "of the first camera of an instant, with the surface and its upload; `a further camera` "
+        "sees the same instant; `all three` is colours, depth and segmentation."
+    )
+    camera.close()
+    return rows.table("images", about)
 
 
 def undo(scene: str = "organ", /, *, times: int = 10) -> BenchmarkResult:
