@@ -59,7 +59,7 @@ def figure(
 
         load_kernels(printing)
         if not printing.quiet:
-            say(f"cutting and drawing figure {number}: about half a minute")
+            say(f"cutting and drawing figure {number}: half a minute to a minute")
         drawn = draw_figure(number, path, scheme)
         if printing.json:
             print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))

@@ -14,8 +14,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from bridge import TissueFrame
+from scalpel_sim.camera.canvas import PixelSize
+from scalpel_sim.camera.viewpoints import Viewpoint, viewpoint_of
 from scalpel_sim.errors import RunError
-from scalpel_sim.figures.camera import Margins, View, fit_view, view_from
 from scalpel_sim.figures.cuts import (
     FIGURE_10,
     FIGURE_10_MOMENTS,
@@ -25,32 +27,22 @@ from scalpel_sim.figures.cuts import (
     moments,
     with_scheme,
 )
+from scalpel_sim.figures.framing import Margins, fitted
 from scalpel_sim.figures.mesh_drawing import draw_mesh
-from scalpel_sim.figures.rendering import SceneObject, render, table_below, texture_of
+from scalpel_sim.figures.studio import picture
 from scalpel_sim.planned_cut import PlannedCut
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.scene.read import SCENES
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.scene.schema import ViewTable
-from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look, look_of_scene
-from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
-from scalpel_sim.viewer.textures import map_texture
 from tissue import FloatArray
 from tissue.support import whole_file
 
-WHITE = (1.0, 1.0, 1.0)
-"""Colour of table and background (sRGB)."""
 TOWARDS_EYE = np.array([0.9, -2.0, 1.9])
 """Position of the eye from the body's centre, in diagonals of the body: it looks into the cut."""
-LAMP = np.array([-0.6, -0.5, 1.2])
-"""Direction towards the lamp, above and to the left of the eye: the light falls into the cut."""
-_STEEL = (0.80, 0.82, 0.85)
-"""Colour of the blade (sRGB)."""
-RELIEF = 0.02
-"""Depth of the relief of skin and cut faces, in repeats of the texture."""
-_WIDTH, HEIGHT = 640, 520
-"""Width and height of each panel [pixels]."""
+PANEL_SIZE = PixelSize(640, 520)
+"""PixelSize of each panel."""
 WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
 """Margins around the body in a picture that also shows the scalpel above it."""
 BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
@@ -142,14 +134,17 @@ def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
     seen = moments(with_scheme(scheme, FIGURE_10), FIGURE_10_MOMENTS)
     view = view_of(seen, BODY_ALONE)
     ends = [seen[0], seen[-1]]
-    panels = [draw_mesh(view, moment.snapshot, moment.surface) for moment in ends]
+    panels = [draw_mesh(view, PANEL_SIZE, moment.snapshot, moment.surface) for moment in ends]
     caption = "mesh structures of the first and the last frame of Figure 10"
     return panels, _drawn(caption, ends, ["", ""])
 
 
 def _figure_12(scheme: str) -> tuple[list[FloatArray], Drawn]:
     seen = [moments(with_scheme(scheme, cut))[-1] for cut in FIGURE_12]
-    panels = [picture(view_of([moment], BODY_ALONE), moment, with_tool=False) for moment in seen]
+    panels = [
+        picture(view_of([moment], BODY_ALONE), PANEL_SIZE, moment, ORGAN_LOOK, with_tool=False)
+        for moment in seen
+    ]
     cells = ["2 × 2 × 2 cells, ", "7 × 7 × 7 cells, "]
     return panels, _drawn("cuts along arbitrary paths through coarse grids", seen, cells)
 
@@ -179,7 +174,7 @@ def _pictures(
 ) -> list[FloatArray]:
     """Return a picture of each moment with the instruments, all in one view."""
     view = view_of(seen, WITH_TOOL, cameras)
-    return [picture(view, moment, with_tool=True, look=look) for moment in seen]
+    return [picture(view, PANEL_SIZE, moment, look, with_tool=True) for moment in seen]
 
 
 def _sizes(seen: Sequence[Moment]) -> list[int]:
@@ -193,12 +188,14 @@ def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Dra
     return Drawn(caption, labels, counts)
 
 
-def view_of(seen: Sequence[Moment], margins: Margins, cameras: Sequence[ViewTable] = ()) -> View:
+def view_of(
+    seen: Sequence[Moment], margins: Margins, cameras: Sequence[ViewTable] = ()
+) -> Viewpoint:
     """Return the view of the first camera; without one, that in which the body always fills it."""
     if cameras:
-        return view_from(cameras[0], _WIDTH, HEIGHT)
+        return viewpoint_of(cameras[0], TissueFrame())
     points = np.concatenate([moment.surface.positions for moment in seen])
-    return fit_view(points, _diagonal(seen[0]) * TOWARDS_EYE, _WIDTH, HEIGHT, margins)
+    return fitted(points, _diagonal(seen[0]) * TOWARDS_EYE, PANEL_SIZE, margins)
 
 
 def _diagonal(moment: Moment) -> float:
@@ -206,41 +203,22 @@ def _diagonal(moment: Moment) -> float:
     return float(np.linalg.norm(np.ptp(moment.surface.rest_positions, axis=0)))
 
 
-def picture(view: View, moment: Moment, *, with_tool: bool, look: Look = ORGAN_LOOK) -> FloatArray:
-    """Return a picture of the textured body on a white table, with the scalpel or without it."""
-    surface = moment.surface
-    textured = map_texture(surface, _diagonal(moment) / TILES_PER_BODY, look=look)
-    skin, inside = texture_of(textures.skin(look)), texture_of(textures.cut_face(look))
-    objects = [SceneObject(textured.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
-    if len(textured.cut.triangles):
-        scattered = (0.12, 0.03, 0.03)  # without scattered light a narrow cut looks black
-        cut = SceneObject(textured.cut, texture=inside, relief=RELIEF, gloss=0.4, shininess=50.0)
-        objects.append(cut._replace(glow=scattered))
-    for mesh, shape in moment.tool if with_tool else ():
-        red, green, blue = _STEEL if shape.is_blade else shape.colour[:3].tolist()
-        gloss = 1.2 if shape.is_blade else 0.4
-        objects.append(
-            SceneObject(mesh, (red, green, blue), gloss=gloss, shininess=80.0, is_slender=True)
-        )
-    bounds = np.stack([surface.positions.min(axis=0), surface.positions.max(axis=0)])
-    objects.append(SceneObject(table_below(bounds), WHITE, catches_shadows_only=True))
-    return render(view, objects, lamp=LAMP, background=WHITE)
-
-
 def _lay_out(panels: list[FloatArray], labels: list[str], title: str) -> Figure:
     """Return the panels, two in a row, each above its letter and label, and the title below all."""
     n_rows = math.ceil(len(panels) / 2)
-    width = 2 * _WIDTH + 3 * GAP
-    height = n_rows * (HEIGHT + LINE + GAP) + 2 * LINE + 2 * GAP
+    width = 2 * PANEL_SIZE.width + 3 * GAP
+    height = n_rows * (PANEL_SIZE.height + LINE + GAP) + 2 * LINE + 2 * GAP
     figure = Figure(figsize=(width / _DOTS_PER_INCH, height / _DOTS_PER_INCH), facecolor="white")
     for i, (panel, label) in enumerate(zip(panels, labels, strict=True)):
-        left = GAP + (i % 2) * (_WIDTH + GAP)
-        bottom = height - (i // 2 + 1) * (HEIGHT + LINE + GAP) + LINE
-        axes = figure.add_axes((left / width, bottom / height, _WIDTH / width, HEIGHT / height))
+        left = GAP + (i % 2) * (PANEL_SIZE.width + GAP)
+        bottom = height - (i // 2 + 1) * (PANEL_SIZE.height + LINE + GAP) + LINE
+        axes = figure.add_axes(
+            (left / width, bottom / height, PANEL_SIZE.width / width, PANEL_SIZE.height / height)
+        )
         axes.imshow(panel, interpolation="none", aspect="auto")
         axes.set_axis_off()
         figure.text(
-            (left + _WIDTH / 2) / width,
+            (left + PANEL_SIZE.width / 2) / width,
             (bottom - LINE / 2) / height,
             f"{'abcd'[i]})  {label}",
             ha="center",

@@ -2,8 +2,12 @@
 
 import numpy as np
 
-from scalpel_sim.figures.camera import View, mean_of_samples
-from scalpel_sim.figures.rasterise import draw_segments, rasterise
+from scalpel_sim.camera.canvas import Canvas, PixelSize
+from scalpel_sim.camera.finishes import Finish
+from scalpel_sim.camera.lights import Light, Rgb
+from scalpel_sim.camera.viewpoints import Viewpoint
+from scalpel_sim.figures.framing import pixel_at
+from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import FloatArray, IntArray, Snapshot, Surface
 
 _PAPER = (1.0, 1.0, 1.0)
@@ -14,46 +18,85 @@ SKIN_LINE, CUT_LINE = (0.13, 0.16, 0.22), (0.75, 0.10, 0.10)
 """Colours of edges of the skin and of edges of cut faces (sRGB)."""
 HIDDEN = 0.13
 """Opacity of lines behind faces: they show how deep the mesh goes, without confusing the eye."""
-_THICKNESS = 1.1
+_THICKNESS = 1.3
 """Thickness of the lines [pixels]."""
-_SLACK = 2e-3
-"""Fraction by which a face must be nearer to hide a line: lines lie on faces, which must not
-hide them."""
+_NO_LIGHT = Light((0.0, 0.0, -1.0), (0.0,) * 3, (0.0,) * 3)
+"""With no lamp at all MuJoCo's renderer has some light of its own."""
+_SAMPLES, _FINE = 4, 2
+"""Samples of each pixel by the renderer, and along each side of a pixel besides."""
 
 
-def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) -> FloatArray:
-    """Return a drawing of the mesh, sRGB from 0 to 1, shape (view.height, view.width, 3).
+def draw_mesh(view: Viewpoint, size: PixelSize, body: Snapshot, surface: Surface) -> FloatArray:
+    """Return a drawing of the mesh, sRGB from 0 to 1, shape (height, width, 3).
 
     Args:
-        view: Projection to the picture.
+        view: Where from, tissue frame.
+        size: PixelSize of the picture.
         body: State of the body whose edges are drawn.
         surface: Surface of the body, which hides the edges behind it.
-        samples: Number of samples along each side of a pixel, against aliasing.
-    """
-    fine = view.sampled(samples)
-    corners = fine.project(surface.positions)[surface.triangles]
-    raster = rasterise(corners, fine.width, fine.height)
-    image = np.empty((fine.height, fine.width, 3))
-    image[:] = _PAPER
-    seen = raster.triangle >= 0
-    is_cut = np.zeros_like(seen)
-    is_cut[seen] = surface.is_cut[raster.triangle[seen]]
-    image[seen] = SKIN_FACE
-    image[is_cut] = CUT_FACE
 
-    of_cut = cell_edges(surface.triangles[surface.is_cut])
-    groups = (
-        (cell_edges(body.tetrahedra), body.positions, SKIN_LINE, False),
-        (cell_edges(surface.triangles[~surface.is_cut]), surface.positions, SKIN_LINE, True),
-        (of_cut, surface.positions, CUT_LINE, True),
+    Raises:
+        RenderError: OpenGL is missing.
+    """
+    width = _THICKNESS * pixel_at(view, size)
+    skin, cut = surface.triangles[~surface.is_cut], surface.triangles[surface.is_cut]
+    at = surface.positions
+    faces = {"skin": (_flat(at, skin), SKIN_FACE), "cut": (_flat(at, cut), CUT_FACE)}
+    lines = {
+        "edges": (rods(at[cell_edges(skin)], width), SKIN_LINE),
+        "edges of the cut": (rods(at[cell_edges(cut)], width), CUT_LINE),
+    }
+    inner = {"inner edges": (rods(body.positions[cell_edges(body.tetrahedra)], width), SKIN_LINE)}
+    seen, behind = _drawn(view, size, faces | lines), _drawn(view, size, inner)
+    return seen * (1.0 - HIDDEN * (1.0 - behind))
+
+
+def _drawn(
+    view: Viewpoint,
+    size: PixelSize,
+    parts: dict[str, tuple[TriangleMesh, Rgb]],
+) -> FloatArray:
+    """Return a picture of meshes in even colours, sRGB from 0 to 1."""
+    finishes = {
+        name: Finish((*colour, 1.0), gloss=0.0, glow=1.0) for name, (_, colour) in parts.items()
+    }
+    canvas = Canvas(finishes=finishes, samples=_SAMPLES, background=_PAPER)
+    try:
+        for name, (mesh, _) in parts.items():
+            canvas.put(name, mesh)
+        canvas.look(view, lights=[_NO_LIGHT])
+        pixels = canvas.colours(PixelSize(_FINE * size.width, _FINE * size.height)) / 255.0
+    finally:
+        canvas.close()
+    mean: FloatArray = pixels.reshape(size.height, _FINE, size.width, _FINE, 3).mean(axis=(1, 3))
+    return mean
+
+
+def _flat(positions: FloatArray, triangles: IntArray) -> TriangleMesh:
+    """Return triangles as a mesh whose normals are not used."""
+    return TriangleMesh(positions, triangles, np.tile([0.0, 0.0, 1.0], (len(positions), 1)))
+
+
+def rods(ends: FloatArray, width: float) -> TriangleMesh:
+    """Return lines as rods with three sides.
+
+    Args:
+        ends: Ends of the lines [m], shape (n, 2, 3).
+        width: Their thickness [m].
+    """
+    way = ends[:, 1] - ends[:, 0]
+    aside = np.cross(way, np.eye(3)[np.abs(way).argmin(axis=1)])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    other = np.cross(way / np.linalg.norm(way, axis=1, keepdims=True), aside)
+    angles = 2.0 * np.pi / 3.0 * np.arange(3)
+    spokes = np.cos(angles)[:, None] * aside[:, None] + np.sin(angles)[:, None] * other[:, None]
+    corners = ends[:, :, None] + 0.5 * width * spokes[:, None]  # (n, 2 ends, 3 spokes, 3)
+    k, after = np.arange(3), (np.arange(3) + 1) % 3
+    sides = np.concatenate(
+        [np.stack([k, after, 3 + k], axis=1), np.stack([after, 3 + after, 3 + k], axis=1)]
     )
-    for edges, positions, colour, is_surface in groups:
-        visible, hidden = np.zeros(seen.shape), np.zeros(seen.shape)
-        ends = np.ascontiguousarray(fine.project(positions)[edges])
-        draw_segments(ends, raster.nearness, samples * _THICKNESS, _SLACK, visible, hidden)
-        drawn = visible if is_surface else HIDDEN * np.maximum(visible, hidden)
-        image += drawn[:, :, None] * (np.array(colour) - image)
-    return mean_of_samples(image, samples)
+    triangles = (6 * np.arange(len(ends))[:, None, None] + sides).reshape(-1, 3)
+    return _flat(corners.reshape(-1, 3), triangles)
 
 
 def cell_edges(cells: IntArray) -> IntArray:

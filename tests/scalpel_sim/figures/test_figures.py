@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES
+from scalpel_sim.camera.canvas import PixelSize
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.figures import figures
 from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
@@ -27,8 +28,7 @@ def wider(monkeypatch, tmp_path):
 
 
 def draw_at(width, height, monkeypatch, folder):
-    monkeypatch.setattr(figures, "_WIDTH", width)
-    monkeypatch.setattr(figures, "HEIGHT", height)
+    monkeypatch.setattr(figures, "PANEL_SIZE", PixelSize(width, height))
     monkeypatch.chdir(folder)
 
 
