@@ -25,6 +25,8 @@ HELPS = (
     "view",
     "replay",
     "export",
+    "snapshot",
+    "film",
     "explain",
     "serve",
     "spacemouse",
