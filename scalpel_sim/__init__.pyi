@@ -7,6 +7,7 @@ from .arm.grasper import add_grasper as add_grasper
 from .arm.scalpel import add_scalpel as add_scalpel
 from .camera.camera import Camera as Camera
 from .camera.lights import Light as Light
+from .camera.pixel_places import pixels_to_points as pixels_to_points
 from .camera.theatre import Theatre as Theatre
 from .instruments.driven_grasper import between_pads as between_pads
 from .instruments.geom_coupling import GeomCoupling as GeomCoupling
@@ -68,6 +69,7 @@ __all__ = [
     "add_scalpel",
     "between_pads",
     "changed",
+    "pixels_to_points",
     "prepare",
     "read_scene",
     "stroke_kind",

@@ -70,6 +70,12 @@ def test_images_of_a_cut_show_what_there_is(run, tmp_path, renderer):
     assert (tmp_path / "endoscope.png").exists() and (tmp_path / "overview.png").exists()
 
 
+def test_a_cut_along_a_line_in_an_image_is_as_long_as_the_line(run, tmp_path, renderer):
+    area, length = numbers(run("cut_in_image.py").replace("mm2", ""))
+    assert area == pytest.approx(6.0 * length, rel=0.15)
+    assert (tmp_path / "planned.png").exists() and (tmp_path / "cut.png").exists()
+
+
 def test_an_edge_moved_through_a_block_meets_toughness_times_thickness(run):
     peak, area, _, pieces = numbers(run("cut_block.py"))
     assert peak == pytest.approx(20.0 * 0.02, rel=0.2)

@@ -10,6 +10,7 @@ import numpy as np
 from scalpel_sim.camera.canvas import Canvas, PixelSize, Thing
 from scalpel_sim.camera.finishes import Finish
 from scalpel_sim.camera.identities import Identities
+from scalpel_sim.camera.lenses import sight_through
 from scalpel_sim.camera.lights import Light, endoscope_lights, room_lights
 from scalpel_sim.camera.theatre import Theatre, theatre_of
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
@@ -27,7 +28,7 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.looks import look_of
 from scalpel_sim.viewer.model_shapes import shapes_of
-from tissue import IntArray
+from tissue import FloatArray, IntArray
 
 _STEEL = Finish((0.8, 0.82, 0.85, 1.0), gloss=1.0, shininess=0.9)
 """Look of a blade."""
@@ -202,6 +203,25 @@ class Camera:
         canvas = self._stage.canvas
         places, things, depth = canvas.numbers_and_depth(self._size)
         return CameraImage(canvas.colours(self._size), depth, self._ids_of(things)[places])
+
+    @property
+    def theatre(self) -> Theatre:
+        """Arm and tissue that the camera sees."""
+        return self._stage.theatre
+
+    def lines_of_sight(self, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the eye [m], shape (3,), and directions from it that places of the image show.
+
+        Args:
+            pixels: Places as columns and rows, from the upper left corner of the image, shape
+                (n, 2): the middle of the first pixel is (0.5, 0.5).
+
+        Returns:
+            The eye, and unit vectors of shape (n, 3); world frame.
+        """
+        canvas = self._stage.canvas
+        canvas.look(self._view, self._stage.theatre.data, self.lights)
+        return sight_through(canvas.lenses, *self._size, pixels)
 
     def close(self) -> None:
         """Free what OpenGL holds, of all cameras that come of one another."""

@@ -1,9 +1,12 @@
 """The lenses of a scene of MuJoCo: where they are, and from where to where they see."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
 from scalpel_sim.camera.viewpoints import Viewpoint
+from tissue import FloatArray
 
 NEAREST = 1e-3
 """Distance from the eye below which nothing is drawn [m]. MuJoCo's own is a share of the extent of
@@ -42,3 +45,29 @@ def widen_range(scene: mujoco.MjvScene) -> None:
         for side in ("near", "bottom", "top", "width", "center"):
             name = f"frustum_{side}"
             setattr(lens, name, share * getattr(lens, name))
+
+
+def sight_through(
+    lenses: Sequence[mujoco.MjvGLCamera], width: int, height: int, pixels: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the eye [m], and unit vectors along the lines of sight through places of a picture.
+
+    Args:
+        lenses: Both eyes of a scene, which are one in a picture.
+        width: Width of the picture [pixels].
+        height: Its height.
+        pixels: Places as columns and rows, from the upper left corner, shape (n, 2).
+
+    Returns:
+        The eye, shape (3,), and the vectors, shape (n, 3); world frame.
+    """
+    names = ("pos", "forward", "up")
+    eye, forward, up = (np.mean([getattr(each, name) for each in lenses], axis=0) for name in names)
+    lens = lenses[0]
+    high = lens.frustum_top - lens.frustum_bottom
+    wide = 2.0 * lens.frustum_width or high * width / height
+    right = np.cross(forward, up)
+    across = lens.frustum_center + (pixels[:, 0] / width - 0.5) * wide
+    upward = lens.frustum_top - pixels[:, 1] / height * high
+    ways = lens.frustum_near * forward + np.outer(across, right) + np.outer(upward, up)
+    return eye, ways / np.linalg.norm(ways, axis=1)[:, None]
