@@ -8,14 +8,13 @@ import mujoco
 import numpy as np
 
 from scalpel_sim.camera.canvas import Canvas, PixelSize, Thing
-from scalpel_sim.camera.finishes import Finish
+from scalpel_sim.camera.finishes import STEEL
 from scalpel_sim.camera.identities import Identities
 from scalpel_sim.camera.lenses import sight_through
-from scalpel_sim.camera.lights import Light, endoscope_lights, room_lights
+from scalpel_sim.camera.lights import WALL, Light, usual_lights
 from scalpel_sim.camera.theatre import Theatre, theatre_of
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
 from scalpel_sim.camera.viewpoints import (
-    ENDOSCOPE,
     OVERVIEW,
     Viewpoint,
     camera_names,
@@ -27,14 +26,8 @@ from scalpel_sim.camera.viewpoints import (
 from scalpel_sim.errors import UsageError
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.looks import look_of
-from scalpel_sim.viewer.model_shapes import shapes_of
+from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from tissue import FloatArray, IntArray
-
-_STEEL = Finish((0.8, 0.82, 0.85, 1.0), gloss=1.0, shininess=0.9)
-"""Look of a blade."""
-
-_WALL = (0.86, 0.89, 0.9)
-"""Colour where nothing is, if the model has no sky: that of the page (sRGB)."""
 
 _MOST_PIXELS = 8192
 """Longest side of an image [pixels]."""
@@ -131,8 +124,7 @@ class Camera:
         self.lights: Sequence[Light] | None = lights
         """Lamps of the next image; None: those of the model, and one at the eye."""
         if lights is None and isinstance(self._view, Viewpoint):
-            is_inside = name == ENDOSCOPE
-            self.lights = endoscope_lights(self._view) if is_inside else room_lights(self._view)
+            self.lights = usual_lights(name, self._view)
 
     @property
     def width(self) -> int:
@@ -265,17 +257,16 @@ class _Stage:
         names = {shape.geom: f"blade of geom {shape.geom}" for shape in sheets}
         self.canvas = Canvas(
             theatre.model,
-            finishes=finishes | dict.fromkeys(names.values(), _STEEL),
+            finishes=finishes | dict.fromkeys(names.values(), STEEL),
             shadows=shadows,
             samples=samples,
-            background=_WALL,
+            background=WALL,
         )
         for shape in sheets:  # a box in the model, whose edge is in the middle of a side
             self.canvas.replace_geom(shape.geom, names[shape.geom], shape.mesh)
         if self._link is not None:
             points = theatre.frame.points_to_world(self._link.surface().positions)
-            self.canvas.middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-            self.canvas.extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+            self.canvas.aim_lamps(points)
 
     def view(self, name: str) -> Viewpoint | int:
         """Return the place of a camera; or its number, of one of the model.
@@ -292,7 +283,8 @@ class _Stage:
         if number is not None:
             return number
         points = np.zeros((1, 3)) if self._link is None else self._link.surface().positions
-        return shipped_viewpoint(name, theatre.model, theatre.data, points, theatre.frame)
+        shapes, poses = list(shapes_of(theatre.model)), body_poses(theatre.data)
+        return shipped_viewpoint(name, shapes, poses, points, theatre.frame)
 
     def refresh(self) -> None:
         """Draw the tissue as it now is."""

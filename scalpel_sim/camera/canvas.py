@@ -20,7 +20,7 @@ from scalpel_sim.camera.lights import Light, Rgb, put_light
 from scalpel_sim.camera.render_model import Capacity, RenderModel
 from scalpel_sim.camera.viewpoints import Viewpoint
 from scalpel_sim.viewer.primitives import TriangleMesh
-from tissue import IntArray
+from tissue import FloatArray, IntArray
 
 SHADOW_PIXELS = 2048
 """Side of the map of a shadow [pixels]."""
@@ -145,6 +145,11 @@ class Canvas:
         self._instead[geom] = name
         self._meshes[name] = mesh, TissueFrame()
         self._stale.add(name)
+
+    def aim_lamps(self, points: FloatArray) -> None:
+        """Choose what lamps that are far away shadow: points of it [m], world frame, (n, 3)."""
+        self.middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        self.extent = float(np.linalg.norm(np.ptp(points, axis=0)))
 
     @property
     def lenses(self) -> Sequence[mujoco.MjvGLCamera]:

@@ -6,12 +6,15 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from scalpel_sim.camera.viewpoints import Viewpoint
+from scalpel_sim.camera.viewpoints import ENDOSCOPE, Viewpoint
 from tissue import FloatArray
 
 Rgb = tuple[float, float, float]
 
 _DARK: Rgb = (0.0, 0.0, 0.0)
+
+WALL = (0.86, 0.89, 0.9)
+"""Colour where nothing is, if the model has no sky: that of the page (sRGB)."""
 
 _BESIDE_LENS = 0.15
 """Distance of the lamp of an endoscope from its lens, over that of what it looks at. A lamp in the
@@ -84,3 +87,13 @@ def endoscope_lights(view: Viewpoint) -> tuple[Light, ...]:
         Light(forward - _BESIDE_LENS * up, (0.95, 0.92, 0.88), (0.7, 0.7, 0.7)),
         Light(forward, _DARK, _DARK, (0.26, 0.25, 0.24), casts_shadow=False),
     )
+
+
+def usual_lights(name: str, view: Viewpoint) -> tuple[Light, ...]:
+    """Return the lamps of a camera by its name: its own of the endoscope, those of the page else.
+
+    Args:
+        name: Name of the camera.
+        view: Where it is.
+    """
+    return endoscope_lights(view) if name == ENDOSCOPE else room_lights(view)

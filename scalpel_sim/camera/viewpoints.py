@@ -9,12 +9,14 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.errors import unknown
 from scalpel_sim.scene.schema import DEFAULT_FOV, ViewTable
-from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
+from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.own_camera import own_eye
 from tissue import FloatArray
 
 OVERVIEW, ENDOSCOPE = "overview", "endoscope"
 """Names of the cameras that are always there."""
+
+SHIPPED = (OVERVIEW, ENDOSCOPE)
 
 ENDOSCOPE_FOV = 60.0
 """Angle from the lower to the upper side of the picture of an endoscope [degree]: laparoscopes have
@@ -70,7 +72,11 @@ def model_cameras(model: mujoco.MjModel) -> dict[str, int]:
 
 
 def shipped_viewpoint(
-    name: str, model: mujoco.MjModel, data: mujoco.MjData, surface: FloatArray, frame: TissueFrame
+    name: str,
+    shapes: Sequence[Shape],
+    body_poses: FloatArray,
+    surface: FloatArray,
+    frame: TissueFrame,
 ) -> Viewpoint:
     """Return the place of a camera that is always there, for arms and body as they are now.
 
@@ -79,14 +85,14 @@ def shipped_viewpoint(
 
     Args:
         name: `overview` or `endoscope`.
-        model: The model.
-        data: Its data.
+        shapes: Visible shapes of the model.
+        body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
         surface: Points of the body's surface [m], tissue frame, shape (n, 3).
         frame: Where the tissue lies in the world.
     """
     lowest, highest = surface.min(axis=0), surface.max(axis=0)
     centre = frame.points_to_world(0.5 * (lowest + highest))
-    eye = own_eye(list(shapes_of(model)), body_poses(data), surface, frame)
+    eye = own_eye(shapes, body_poses, surface, frame)
     if name == OVERVIEW:
         return Viewpoint(eye, centre)
     way = (eye - centre) / np.linalg.norm(eye - centre)
@@ -96,7 +102,7 @@ def shipped_viewpoint(
 
 def camera_names(views: Sequence[ViewTable], model: mujoco.MjModel) -> list[str]:
     """Return the names of all cameras: of the scene, of the model, and those always there."""
-    names = [*(view.name for view in views), *model_cameras(model), OVERVIEW, ENDOSCOPE]
+    names = [*(view.name for view in views), *model_cameras(model), *SHIPPED]
     return list(dict.fromkeys(names))
 
 

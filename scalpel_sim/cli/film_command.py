@@ -1,7 +1,6 @@
 """The command `film`: a film of a scene, or of a run whose folder is there."""
 
 import json
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ from cyclopts import Parameter
 from scalpel_sim.cli.camera_options import CameraOptions, FilmOptions
 from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions, expect_no_options
 from scalpel_sim.errors import UsageError
-from scalpel_sim.runs.console import log_to_stderr, progress, say
+from scalpel_sim.runs.console import log_to_stderr, say
 from scalpel_sim.runs.options import OUTPUT, PrintOptions
 
 
@@ -28,7 +27,8 @@ def film(
     """Make a film of a scene, or of a run; no screen is needed.
 
     MP4 and WebM are written by the ffmpeg on the PATH; where there is none, an animated PNG takes
-    their place. A run is done again from its folder, which gives the same bits.
+    their place. A run with a recording (`run --record`) is played, any other is done again from its
+    folder, which gives the same bits.
 
     For example:
 
@@ -39,54 +39,45 @@ def film(
     ```
 
     Args:
-        scene: What to cut, as for `run`; or the folder of a run.
+        scene: What to cut, as for `run`; or the folder of a run, or its recording, a FILE.vtkhdf.
         output: File of the film: .mp4, .webm, .png (animated), .gif or .webp.
     """
     with log_to_stderr(printing):
         from scalpel_sim.camera.canvas import PixelSize
-        from scalpel_sim.camera.film import film_frames
         from scalpel_sim.camera.film_files import film_path, open_film
         from scalpel_sim.camera.force_panel import ForcePanel
-        from scalpel_sim.cli.camera_run import camera_run
-        from scalpel_sim.runs.run import run_time
+        from scalpel_sim.cli.film_sources import recorded, simulated
 
         pace.check()
         path, told = film_path(output)
-        if scene is not None and Path(scene).is_dir():
-            expect_no_options((tissue, arm), f"the run in {scene}, which is done again as it was")
-            scene = _scene_of_run(Path(scene))
+        scene_file, recording = (None, None) if scene is None else _asked(scene)
+        if scene_file != scene:
+            expect_no_options((tissue, arm), f"the run in {scene}, which is shown as it was")
         if told and not printing.quiet:
             say(told)
-        n_pictures = 0
-        with camera_run(scene, tissue, arm, camera, printing) as run:
-            simulation = run.simulation
-            ends = partial(run_time, seconds=run.scene.seconds)
-            seconds, panel = ends(simulation), None
-            size = PixelSize(camera.width, camera.height)
+        interval = 1.0 / (pace.fps * pace.slow)
+        size, panel, n_pictures = PixelSize(camera.width, camera.height), None, 0
+        with (
+            simulated(scene_file, tissue, arm, camera, printing, interval=interval)
+            if recording is None
+            else recorded(recording, camera, interval=interval)
+        ) as source:
             if pace.plot:
-                names = [each.name for each in simulation.graspers]
-                panel = ForcePanel(names, seconds, size)
+                panel = ForcePanel(source.graspers, source.seconds, size)
                 size = PixelSize(2 * size.width, size.height)
-            with progress(seconds, printing) as advance, open_film(path, size, pace.fps) as file:
-                for picture in film_frames(
-                    simulation,
-                    run.camera,
-                    ends,
-                    interval=1.0 / (pace.fps * pace.slow),
-                    panel=panel,
-                    every_frame=advance,
-                ):
+            with open_film(path, size, pace.fps) as file:
+                for picture in source.pictures(panel):
                     file.add(picture)
                     n_pictures += 1
-            found = {
-                "scene": run.scene.name,
-                "camera": run.camera.name,
-                "file": str(path),
-                "pictures": n_pictures,
-                "fps": pace.fps,
-                "simulated_s": simulation.time,
-                "renderer": run.camera.renderer,
-            }
+        found = {
+            "scene": source.title,
+            "camera": camera.camera,
+            "file": str(path),
+            "pictures": n_pictures,
+            "fps": pace.fps,
+            "simulated_s": (n_pictures - 1) * interval,
+            "renderer": source.renderer,
+        }
         if printing.json:
             print(json.dumps(found, indent=2))
         elif not printing.quiet:
@@ -96,16 +87,25 @@ def film(
             )
 
 
-def _scene_of_run(folder: Path) -> str:
-    """Return the scene file of a run.
+def _asked(scene: str) -> tuple[str | None, Path | None]:
+    """Return the scene, and the recording that is to be played; None: there is none.
 
     Raises:
-        UsageError: the folder has none.
+        UsageError: it is a folder without a scene.
     """
     from scalpel_sim.runs.file_names import SCENE
+    from scalpel_sim.saved_run.layout import VTKHDF_SUFFIX
 
-    if not (folder / SCENE).is_file():
+    path = Path(scene)
+    if path.suffix.lower() == VTKHDF_SUFFIX:
+        return None, path
+    if not path.is_dir():
+        return scene, None
+    recordings = sorted(path.glob(f"*{VTKHDF_SUFFIX}"))
+    if len(recordings) == 1:
+        return None, recordings[0]
+    if not (path / SCENE).is_file():
         raise UsageError(
-            f"{folder} has no {SCENE}: it is no folder of a run, or of one whose body was elsewhere"
+            f"{path} has no {SCENE}: it is no folder of a run, or of one whose body was elsewhere"
         )
-    return str(folder / SCENE)
+    return str(path / SCENE), None

@@ -87,6 +87,29 @@ def test_a_film_of_a_run_is_that_of_its_scene_and_slow_motion_has_more_pictures(
             assert (np.asarray(slower.convert("RGB")) == own).all()
 
 
+@needs_renderer
+def test_a_recorded_run_is_played_without_simulating(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "out"
+    recording, played, simulated = (tmp_path / name for name in ("a.vtkhdf", "a.png", "b.png"))
+    asked = ["run", "slab", "--seconds", "0.2", "--quiet", "--out", str(out)]
+    assert command_line([*asked, "--record", str(recording)]) == EXIT_OK
+    assert (
+        command_line(["film", "slab", "--seconds", "0.2", *SMALL, "-o", str(simulated)]) == EXIT_OK
+    )
+    monkeypatch.setattr("scalpel_sim.cli.camera_run.prepare", None)
+    assert command_line(["film", str(recording), *SMALL, "--plot", "-o", str(played)]) == EXIT_OK
+    with Image.open(played) as one, Image.open(simulated) as other:
+        assert one.n_frames == other.n_frames == 5 and one.size == (128, 48)
+        for i in (0, 4):
+            one.seek(i)
+            other.seek(i)
+            pictures = [
+                np.asarray(film.convert("RGB"))[:, :64].astype(int) for film in (one, other)
+            ]
+            # Round shapes of the arm have other facets, and a floor has an end.
+            assert np.median(np.abs(pictures[0][:, :64] - pictures[1])) <= 2
+
+
 def gradients() -> list[np.ndarray]:
     """Return pictures of an odd size whose colours go by."""
     y, x = np.mgrid[0:49, 0:65]
@@ -161,7 +184,8 @@ def test_an_ffmpeg_without_an_encoder_is_refused(tmp_path, monkeypatch):
         (["slab", "-o", "a.gif", "--fps", "0"], "--fps is 0; it must be from 1 to 120"),
         (["slab", "-o", "a.gif", "--slow", "0"], "--slow is 0"),
         (["there", "-o", "a.gif"], "there has no scene.toml"),
-        (["there", "-o", "a.gif", "--toughness", "3"], "toughness"),
+        (["there.vtkhdf", "-o", "a.gif", "--toughness", "3"], "toughness"),
+        (["there.vtkhdf", "-o", "a.gif"], "there.vtkhdf: there is no such file"),
     ],
 )
 def test_what_cannot_be_filmed_is_refused(options, message, tmp_path, monkeypatch, capsys):
