@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 
 from scalpel_sim.camera.canvas import Canvas, PixelSize, Thing
-from scalpel_sim.camera.finishes import STEEL
+from scalpel_sim.camera.finishes import POLISHED_STEEL
 from scalpel_sim.camera.identities import Identities
 from scalpel_sim.camera.lenses import sight_through
-from scalpel_sim.camera.lights import WALL, Light, usual_lights
+from scalpel_sim.camera.lights import WALL_COLOUR, Light, usual_lights
 from scalpel_sim.camera.theatre import Theatre, theatre_of
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
 from scalpel_sim.camera.viewpoints import (
@@ -257,10 +257,10 @@ class _Stage:
         names = {shape.geom: f"blade of geom {shape.geom}" for shape in sheets}
         self.canvas = Canvas(
             theatre.model,
-            finishes=finishes | dict.fromkeys(names.values(), STEEL),
+            finishes=finishes | dict.fromkeys(names.values(), POLISHED_STEEL),
             shadows=shadows,
             samples=samples,
-            background=WALL,
+            background=WALL_COLOUR,
         )
         for shape in sheets:  # a box in the model, whose edge is in the middle of a side
             self.canvas.replace_geom(shape.geom, names[shape.geom], shape.mesh)

@@ -23,7 +23,7 @@ class Finish(NamedTuple):
     """Light that it gives off, as a factor of its colour."""
 
 
-STEEL = Finish((0.8, 0.82, 0.85, 1.0), gloss=1.0, shininess=0.9)
+POLISHED_STEEL = Finish((0.8, 0.82, 0.85, 1.0), gloss=1.0, shininess=0.9)
 """Look of a blade."""
 
 

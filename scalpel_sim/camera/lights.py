@@ -13,7 +13,7 @@ Rgb = tuple[float, float, float]
 
 _DARK: Rgb = (0.0, 0.0, 0.0)
 
-WALL = (0.86, 0.89, 0.9)
+WALL_COLOUR = (0.86, 0.89, 0.9)
 """Colour where nothing is, if the model has no sky: that of the page (sRGB)."""
 
 _BESIDE_LENS = 0.15

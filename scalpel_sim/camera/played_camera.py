@@ -6,8 +6,8 @@ import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.camera.canvas import Canvas, PixelSize
-from scalpel_sim.camera.finishes import STEEL, Finish
-from scalpel_sim.camera.lights import WALL, usual_lights
+from scalpel_sim.camera.finishes import POLISHED_STEEL, Finish
+from scalpel_sim.camera.lights import WALL_COLOUR, usual_lights
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
 from scalpel_sim.camera.viewpoints import SHIPPED, Viewpoint, shipped_viewpoint, viewpoint_of
 from scalpel_sim.errors import unknown
@@ -46,8 +46,10 @@ class PlayedCamera:
         for name, shape in zip(self._names, self._shapes, strict=True):
             red, green, blue, opacity = shape.colour.tolist()
             painted = Finish((red, green, blue, opacity))
-            finishes[name] = STEEL if shape.is_blade else painted
-        self._canvas = Canvas(finishes=finishes, shadows=shadows, samples=samples, background=WALL)
+            finishes[name] = POLISHED_STEEL if shape.is_blade else painted
+        self._canvas = Canvas(
+            finishes=finishes, shadows=shadows, samples=samples, background=WALL_COLOUR
+        )
         self._view: Viewpoint | None = None
         self._name = ""
 

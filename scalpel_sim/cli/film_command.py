@@ -46,7 +46,7 @@ def film(
         from scalpel_sim.camera.canvas import PixelSize
         from scalpel_sim.camera.film_files import film_path, open_film
         from scalpel_sim.camera.force_panel import ForcePanel
-        from scalpel_sim.cli.film_sources import recorded, simulated
+        from scalpel_sim.cli.film_sources import recorded_source, simulated_source
 
         pace.check()
         path, told = film_path(output)
@@ -58,9 +58,9 @@ def film(
         interval = 1.0 / (pace.fps * pace.slow)
         size, panel, n_pictures = PixelSize(camera.width, camera.height), None, 0
         with (
-            simulated(scene_file, tissue, arm, camera, printing, interval=interval)
+            simulated_source(scene_file, tissue, arm, camera, printing, interval=interval)
             if recording is None
-            else recorded(recording, camera, interval=interval)
+            else recorded_source(recording, camera, interval=interval)
         ) as source:
             if pace.plot:
                 panel = ForcePanel(source.graspers, source.seconds, size)

@@ -41,7 +41,7 @@ class FilmSource(NamedTuple):
 
 
 @contextmanager
-def simulated(
+def simulated_source(
     scene: str | None,
     tissue: TissueOptions,
     arm: ArmOptions,
@@ -80,7 +80,7 @@ def simulated(
 
 
 @contextmanager
-def recorded(path: Path, camera: CameraOptions, *, interval: float) -> Iterator[FilmSource]:
+def recorded_source(path: Path, camera: CameraOptions, *, interval: float) -> Iterator[FilmSource]:
     """Yield a recorded run that is played: nothing is simulated.
 
     Args:
