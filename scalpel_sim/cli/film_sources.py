@@ -1,4 +1,4 @@
-"""What a film is made of: a scene that is simulated, or a recorded run that is played."""
+"""Runs of which there are films: a scene that is simulated, or a recorded run that is played."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
