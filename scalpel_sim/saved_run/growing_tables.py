@@ -1,5 +1,6 @@
 """Tables that grow step by step in one HDF5 file, which is whole whenever its writer is killed."""
 
+import logging
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,6 +11,8 @@ import numpy.typing as npt
 from scalpel_sim.errors import writing
 from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, Describe, GrowingTable, LaidOutFile
 from tissue.support import remove_unfinished, whole_file
+
+_log = logging.getLogger(__name__)
 
 _INSTEAD = "another --record"
 
@@ -124,21 +127,28 @@ class GrowingTables:
     def finish(self) -> None:
         """Close the file, and take the room that is left out of it.
 
-        Raises:
-            RunError: the system refuses. The file has all steps nevertheless.
+        Where the system refuses, that is logged, and the file stays as it is, with all steps.
         """
         starts, is_in_place = self._file.starts, self._file.path == self.path
         self.close()
         if not is_in_place:
             return
         exact = [each._replace(room=self._lengths[name]) for name, each in self._tables.items()]
-        with writing(self.path, _INSTEAD), whole_file(self.path) as unfinished:
-            file = LaidOutFile(unfinished, exact, self._describe)
-            try:
-                file.copy(self.path, starts, self._lengths)
-                file.show(self._lengths)
-            finally:
-                file.close()
+        try:
+            with whole_file(self.path) as unfinished:
+                file = LaidOutFile(unfinished, exact, self._describe)
+                try:
+                    file.copy(self.path, starts, self._lengths)
+                    file.show(self._lengths)
+                finally:
+                    file.close()
+        except OSError as error:
+            _log.warning(
+                "%s: is complete, but cannot be written anew without the room that was not used "
+                "(%s): it looks larger than it is",
+                self.path,
+                error.strerror or error,
+            )
 
     def close(self) -> None:
         """Close the file as it is. May be called twice."""

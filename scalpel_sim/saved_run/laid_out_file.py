@@ -9,8 +9,11 @@ steps, and the length of the table of their times. Until then a reader sees the 
 Room that is not used is a hole in the file, and takes no space on the disk.
 """
 
+import os
+import re
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
@@ -103,7 +106,7 @@ class LaidOutFile:
         self._shown = dict.fromkeys(self._tables, -1)
         times = self._tables[STEP_TIMES]
         # The form of before 1.8 has no checksums, and no mark of a file that is open.
-        with h5py.File(path, "w", libver=("earliest", "v108")) as file:
+        with _said_in_short(), h5py.File(path, "w", libver=("earliest", "v108")) as file:
             file.create_group(STEPS).attrs.create("NSteps", np.frombuffer(_MARKER, "<i8")[0])
             found = {STEP_TIMES: _new_table(file, times)}  # next to the number: in one page with it
             for table in self._tables.values():
@@ -223,6 +226,18 @@ class LaidOutFile:
         rest = memoryview(content)
         while rest:  # a disk that gets full takes a part
             rest = rest[self._file.write(rest) :]
+
+
+@contextmanager
+def _said_in_short() -> Iterator[None]:
+    """Turn an error of HDF5 into that of the system, without addresses."""
+    try:
+        yield
+    except OSError as error:
+        found = re.search(r"errno = (\d+)", str(error))
+        if found is None:
+            raise
+        raise OSError(int(found[1]), os.strerror(int(found[1]))) from error
 
 
 def _new_table(file: "h5py.File", table: GrowingTable) -> tuple[int, int]:

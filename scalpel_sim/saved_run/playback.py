@@ -30,7 +30,7 @@ def write_replay(run: SavedRun, path: Path) -> None:
     """
     stage = run.stage
     replay = ReplayWriter(
-        stage.shapes, title=stage.title, frame=stage.frame, views=stage.views, look=stage.look
+        stage.shapes, title=run.title, frame=run.frame, views=stage.views, look=stage.look
     )
     for number in range(len(run)):
         step = run.step(number)

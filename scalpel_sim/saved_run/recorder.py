@@ -28,12 +28,11 @@ from scalpel_sim.saved_run.layout import (
     Sizes,
     tables_of,
 )
-from scalpel_sim.saved_run.stage import stage_of
+from scalpel_sim.saved_run.stage import rows_of, stage_of
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.write import scene_text
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.version import version
-from scalpel_sim.viewer.packing import pack
 
 if TYPE_CHECKING:
     import h5py
@@ -84,7 +83,8 @@ class RunRecorder:
         if self.path.suffix.lower() != VTKHDF_SUFFIX:
             raise UsageError(f"{path}: the name of a recording must end in {VTKHDF_SUFFIX}")
         self._simulation = simulation
-        self._stage = pack(stage_of(simulation, scene))
+        self._stage = stage_of(simulation, scene).to_bytes()
+        self._title = simulation.title
         self._scene_text = None if scene is None else scene_text(scene, self.path)
         self._every = max(1, round(1.0 / (STEPS_PER_SECOND * simulation.dt)))
         self._tables = tables_of(self._sizes(USUAL_SECONDS if seconds is None else seconds))
@@ -244,6 +244,8 @@ class RunRecorder:
         names = {str(label): name for label, name in simulation.link.label_names.items()}
         own.attrs["format"] = FORM
         own.attrs["version"] = version("scalpel-sim")
+        own.attrs["title"] = self._title
+        own.attrs["frame"] = rows_of(simulation.frame)
         own.attrs["dt"] = simulation.dt
         own.attrs["columns"] = list(simulation.recording.columns)
         own.attrs["bodies"] = [model.body(i).name for i in range(model.nbody)]

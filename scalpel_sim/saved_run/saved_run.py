@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from bridge import TissueFrame
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.saved_run.laid_out_file import STEP_TIMES
 from scalpel_sim.saved_run.layout import (
@@ -28,10 +27,9 @@ from scalpel_sim.saved_run.layout import (
     field_table,
 )
 from scalpel_sim.saved_run.saved_step import SavedStep
-from scalpel_sim.saved_run.stage import Stage
+from scalpel_sim.saved_run.stage import Stage, frame_from
 from scalpel_sim.scene.read import SceneFile, scene_in
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.viewer.packing import unpack
 from tissue import (
     BladeSegment,
     Deformation,
@@ -82,7 +80,7 @@ class SavedRun:
             ) from error
         try:
             self._begin()
-        except (KeyError, msgspec.ValidationError, json.JSONDecodeError) as error:
+        except (KeyError, json.JSONDecodeError) as error:
             self.close()
             raise UsageError(
                 f"{path}: is no recording of a run ({error}); `scalpel-sim run --record "
@@ -116,8 +114,10 @@ class SavedRun:
         names = json.loads(own["label_names"][()])
         self.label_names = {int(label): str(name) for label, name in names.items()}
         """Names of labels of the body."""
-        self.stage = unpack(own["stage"][:].tobytes(), Stage)
-        """Shapes of the arm, views, and the look of the body: for pages."""
+        self.title = str(own.attrs["title"])
+        """Heading: the scene and the stroke."""
+        self.frame = frame_from(own.attrs["frame"])
+        """Pose of the tissue in the world."""
         self.scene_text = own["scene"][()].decode() if "scene" in own else None
         """Text of the scene, whose files are relative to the folder of the recording; None: it is
         not known, or its body is in no table."""
@@ -136,15 +136,20 @@ class SavedRun:
         """Close the file. What was read stays. May be called twice."""
         self._file.close()
 
-    @property
-    def title(self) -> str:
-        """Heading: the scene and the stroke."""
-        return self.stage.title
+    @cached_property
+    def stage(self) -> Stage:
+        """Shapes of the arm, views, and the look of the body: for pages.
 
-    @property
-    def frame(self) -> TissueFrame:
-        """Pose of the tissue in the world."""
-        return self.stage.frame
+        Raises:
+            UsageError: another version of the program wrote them, in another form.
+        """
+        try:
+            return Stage.from_bytes(self._file[f"{OWN}/stage"][:].tobytes())
+        except msgspec.ValidationError as error:
+            raise UsageError(
+                f"{self.path}: version {self.version} of the program wrote the shapes of the arm "
+                f"in another form ({error}), so that they cannot be drawn; all else can be read"
+            ) from error
 
     @cached_property
     def scene(self) -> Scene | None:

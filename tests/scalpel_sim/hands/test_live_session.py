@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from scalpel_sim import read_scene
+from scalpel_sim import SavedRun, read_scene
 from scalpel_sim.runs.file_names import SCENE, STROKE, SUMMARY
 from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView, document, page_of, token_in
 from tissue import MATERIALS
@@ -56,6 +56,22 @@ def test_the_page_begins_a_run_of_another_scene_material_and_blade_in_its_own_fo
     assert scene.material.toughness == 20.0
     assert scene.blade.thickness == 3e-4
     assert scene.material.young_modulus == MATERIALS["gelatin"].young_modulus.value
+
+
+def test_each_run_of_a_page_is_recorded_to_a_file_of_its_own(tmp_path):
+    record = ("--record", str(tmp_path / "cut.vtkhdf"))
+    with LiveView("grid2", tmp_path / "out", *record) as view:
+        view.wait_for_files()
+        asyncio.run(say(view, begin(is_led=True)))
+        until_titled(view, "grid2: led by hand")
+        move = {"type": "move", "by": [0.0, 0.01, 0.0], "stamp": 1}
+        asyncio.run(say(view, {"type": "engage"}, move, {"type": "release"}, {"type": "end"}))
+        view.wait_for_files()
+    for end in ("", "-2"):
+        done = summary(tmp_path / f"out{end}")
+        with SavedRun(tmp_path / f"cut{end}.vtkhdf") as run:
+            assert run.times[-1] == pytest.approx(done["simulated_seconds"])
+            assert len(run.rows) == done["frames"] and run.title.startswith("grid2")
 
 
 def test_a_script_that_is_watched_gives_way_to_a_hand(tmp_path):

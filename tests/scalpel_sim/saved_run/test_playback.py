@@ -2,6 +2,7 @@
 
 import re
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -9,6 +10,9 @@ from scalpel_sim import SCENES, RunRecorder, SavedRun, prepare
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.export import ENDINGS
 from scalpel_sim.scene.scene import changed
+from scalpel_sim.viewer.looks import look_of_scene
+from scalpel_sim.viewer.model_shapes import shapes_of
+from scalpel_sim.viewer.packing import pack
 from tests.scalpel_sim.output.test_export import exported_mesh
 from tests.support.browser import local_file
 from tissue import read_mesh
@@ -51,6 +55,27 @@ def test_of_a_folder_its_replay_or_its_one_recording_is_played(recorded, tmp_pat
         (tmp_path / f"{name}.vtkhdf").touch()
     assert command_line(["replay", str(tmp_path)]) == 2
     assert "choose one of a.vtkhdf, b.vtkhdf" in capsys.readouterr().err
+
+
+def test_shapes_are_read_as_they_were(recorded):
+    expected = list(shapes_of(prepare(LAYERS).arm.model))
+    with SavedRun(recorded) as run:
+        assert run.stage.look == look_of_scene(LAYERS)
+        for shape, other in zip(run.stage.shapes, expected, strict=True):
+            assert pack(shape) == pack(other)
+
+
+def test_all_but_the_page_can_be_read_where_shapes_have_another_form(recorded, tmp_path, capsys):
+    import h5py
+
+    path = tmp_path / "old.vtkhdf"
+    path.write_bytes(recorded.read_bytes())
+    with h5py.File(path, "r+") as file:
+        del file["scalpel_sim/stage"]
+        file["scalpel_sim/stage"] = np.frombuffer(msgspec.msgpack.encode({}), np.uint8)
+    assert command_line(["export", str(path), "-o", str(tmp_path / "body.vtu")]) == 0
+    assert command_line(["replay", str(path)]) == 2
+    assert re.search("shapes of the arm in another form.*cannot be drawn", capsys.readouterr().err)
 
 
 @pytest.mark.browser
