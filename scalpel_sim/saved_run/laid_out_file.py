@@ -9,6 +9,7 @@ steps, and the length of the table of their times. Until then a reader sees the 
 Room that is not used is a hole in the file, and takes no space on the disk.
 """
 
+import math
 import os
 import re
 import struct
@@ -73,7 +74,7 @@ class GrowingTable(NamedTuple):
     @property
     def row_bytes(self) -> int:
         """Length of a row [bytes]."""
-        return int(np.dtype(self.kind).itemsize * np.prod(self.width, dtype=int))
+        return int(np.dtype(self.kind).itemsize * math.prod(self.width))
 
 
 class _Place(NamedTuple):

@@ -99,6 +99,12 @@ def test_a_saved_run_has_surface_arm_and_forces_of_each_step(recorded, run):
     assert len(run) == len(truths) and run.graspers == ("left",)
     for i, truth in enumerate(truths):
         step = run.step(i)
+        for kind in ("positions", "rest_positions", "velocities", "masses", "tetrahedra", "fixed"):
+            expected = getattr(truth.snapshot, kind)
+            expected = single(expected) if expected.dtype == float else expected
+            assert np.array_equal(getattr(step.snapshot, kind), expected)
+        assert np.array_equal(step.deformation.stress, single(truth.deformation.stress))
+        assert np.array_equal(step.deformation.strain, single(truth.deformation.strain))
         assert np.array_equal(step.surface.positions, single(truth.surface.positions))
         assert np.array_equal(step.surface.triangles, truth.surface.triangles)
         assert np.array_equal(step.surface.is_cut, truth.surface.is_cut)
