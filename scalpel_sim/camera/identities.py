@@ -14,6 +14,10 @@ from tissue import IntArray
 _NOTHING, _BLADE, _ARM, _WORLD = "nothing", "blade", "arm", "world"
 """Names of what there is besides the tissue and the graspers."""
 
+_KINDS = mujoco.mjtObj
+_OF_ARM = {int(kind) for kind in (_KINDS.mjOBJ_TENDON, _KINDS.mjOBJ_SITE, _KINDS.mjOBJ_SKIN)}
+"""Kinds of parts of a model, besides geoms, that belong to arms."""
+
 
 class Identities:
     """Numbers of what cameras see: tissue, blade, graspers, the rest of the arms, the world.
@@ -46,8 +50,7 @@ class Identities:
             return self._parts[thing.mesh]
         if thing.kind == int(mujoco.mjtObj.mjOBJ_GEOM):
             return int(self._geoms[thing.number])
-        is_of_arm = thing.kind in (int(mujoco.mjtObj.mjOBJ_TENDON), int(mujoco.mjtObj.mjOBJ_SITE))
-        return self._arm if is_of_arm else self._world
+        return self._arm if thing.kind in _OF_ARM else self._world
 
     def _of_geoms(self, theatre: Theatre, numbers: Sequence[int]) -> IntArray:
         """Return the numbers of the geoms of the model."""

@@ -119,7 +119,7 @@ class RenderModel:
 
 
 def _add_assets(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Add as many textures, materials, height fields, meshes and planes as a model has."""
+    """Add as many textures, materials, height fields, meshes, skins and planes as a model has."""
     for i in range(model.ntex):
         width, height = int(model.tex_width[i]), int(model.tex_height[i])
         channels, first = int(model.tex_nchannel[i]), int(model.tex_adr[i])
@@ -158,6 +158,8 @@ def _add_assets(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
             (int(model.mesh_normalnum[i]), model.mesh_facenormal[faces]),
             (n_places, model.mesh_facetexcoord[faces]) if n_places else None,
         )
+    for i in range(model.nskin):
+        _add_skin(spec, model, i)
     for i in range(model.ngeom):  # a plane is drawn by the number of its geom
         if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_PLANE:
             material_number = int(model.geom_matid[i])
@@ -166,6 +168,20 @@ def _add_assets(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
             spec.worldbody.add_geom(type=kind, size=size, **painted)
         else:
             spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1.0, 0.0, 0.0])
+
+
+def _add_skin(spec: mujoco.MjSpec, model: mujoco.MjModel, number: int) -> None:
+    """Add a skin of the right sizes: where it is comes with each scene of the first model."""
+    first, n = int(model.skin_vertadr[number]), int(model.skin_vertnum[number])
+    face, m = int(model.skin_faceadr[number]), int(model.skin_facenum[number])
+    skin = spec.add_skin(name=f"skin {number}")
+    skin.vert = model.skin_vert[first : first + n].ravel()
+    skin.face = model.skin_face[face : face + m].ravel()
+    place = int(model.skin_texcoordadr[number])
+    if place >= 0:
+        skin.texcoord = model.skin_texcoord[place : place + n].ravel()
+    skin.bodyname, skin.bindpos, skin.bindquat = ["world"], [0.0] * 3, [1.0, 0.0, 0.0, 0.0]
+    skin.vertid, skin.vertweight = [list(range(n))], [[1.0] * n]
 
 
 def _add_sky(spec: mujoco.MjSpec, colour: Rgb) -> None:

@@ -1,11 +1,23 @@
 """Images against rays, the user's model, names and numbers."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 
 from bridge import TissueFrame
-from scalpel_sim import SCENES, Blade, Camera, Grasper, Theatre, add_grasper, prepare
+from scalpel_sim import (
+    SCENES,
+    Blade,
+    Camera,
+    Grasper,
+    Theatre,
+    add_grasper,
+    changed,
+    prepare,
+    read_scene,
+)
 from scalpel_sim.camera.camera import CameraImage
 from scalpel_sim.errors import UsageError
 from tests.scalpel_sim.camera.traced import Tracer
@@ -33,6 +45,8 @@ ARM = """
   </worldbody>
 </mujoco>
 """
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+
 FRAME = TissueFrame(np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]))
 
 
@@ -223,6 +237,23 @@ def test_a_grasper_on_an_arm_of_ones_own_is_named():
     camera = Camera(Theatre(model, data, graspers={"left": grasper}), "front", width=96, height=96)
     assert dict(camera.ids) == {"nothing": 0, "blade": 1, "left": 2, "arm": 3, "world": 4}
     assert (camera.segmentation() == 2).any()
+
+
+@pytest.mark.parametrize("scene", ["psm", "own arm", "two bodies"])
+def test_any_arm_and_any_bodies_are_seen_by_the_cameras_that_are_always_there(scene):
+    scenes = {
+        "psm": lambda: changed(SCENES["organ"], preset="psm"),
+        "own arm": lambda: read_scene(EXAMPLES / "robot.toml"),
+        "two bodies": lambda: SCENES["gallbladder"],
+    }
+    overview = Camera(prepare(scenes[scene]()), "overview", width=96, height=72)
+    for camera in (overview, overview.another("endoscope")):
+        picture = camera.segmentation()
+        names = list(camera.ids)
+        tissue = (picture > 0) & (picture < camera.ids["blade"])
+        assert 0.03 < tissue.mean() < 0.5
+        assert (picture == camera.ids["blade"]).any()
+        assert names[1:3] == ["skin", "cut"] or len(names) > 8
 
 
 def test_views_of_the_scene_come_first_and_are_where_it_says():

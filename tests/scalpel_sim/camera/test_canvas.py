@@ -54,7 +54,19 @@ MODEL = """
       <geom type="box" size=".05 .05 .05" pos=".1 .1 .3" material="cross"/>
       <geom type="capsule" size=".02 .1" pos="-.3 0 .1" rgba="0 1 0 .5"/>
     </body>
+    <body name="clothed" pos=".2 -.3 .1"><joint/><geom size=".02"/></body>
+    <flexcomp name="jelly" type="grid" count="4 4 2" spacing=".05 .05 .05" pos="-.4 -.4 .2" dim="3"
+              rgba=".3 .5 1 1" radius=".005">
+      <contact selfcollide="none"/>
+      <elasticity young="1e4"/>
+    </flexcomp>
   </worldbody>
+  <deformable>
+    <skin name="sleeve" vertex="0 0 0 .2 0 0 0 0 .2" face="0 1 2" texcoord="0 0 1 0 0 1"
+          material="tiles">
+      <bone body="clothed" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2" vertweight="1 1 1"/>
+    </skin>
+  </deformable>
 </mujoco>
 """
 
