@@ -148,6 +148,8 @@ def print_report(summary: "Summary", prepared: "PreparedRun") -> None:
         print(f"files in {folder}: {', '.join(names)}")
         if prepared.exports:
             print(f"exported: {', '.join(map(str, prepared.exports))}")
+        if prepared.record is not None:
+            print(f"recorded: {prepared.record}; scalpel-sim replay {prepared.record} plays it")
 
 
 def expect_no_warnings(summary: "Summary", options: RunOutputOptions) -> None:

@@ -170,8 +170,7 @@ class GrowingTables:
     def _put_in_place(self) -> None:
         """Give the file its name."""
         if self._file.path != self.path:
-            self._file.path.replace(self.path)
-            self._file.path = self.path
+            self._file.move_to(self.path)
 
     def _reserve(self, name: str, n_rows: int) -> None:
         """Double the room of a table until it takes so many rows, in the next file."""

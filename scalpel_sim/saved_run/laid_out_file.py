@@ -190,6 +190,13 @@ class LaidOutFile:
             self._show_steps(lengths[STEP_TIMES])
         self._shown = dict(lengths)
 
+    def move_to(self, path: Path) -> None:
+        """Give the file another name; a file of that name is replaced."""
+        self._file.close()  # no file that is open can be moved on Windows
+        self.path.replace(path)
+        self.path = path
+        self._file = path.open("r+b", buffering=0)
+
     def close(self) -> None:
         """Close the file as it is. May be called twice."""
         self._file.close()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from scalpel_sim import SavedRun
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import ENDINGS, export_surface, surface_pieces
@@ -244,11 +245,15 @@ def test_a_run_exports_the_body_to_each_file_that_is_asked_for(tmp_path):
     assert all(exported_mesh(file).area > 0.0 for file in files)
 
 
-def test_the_report_of_a_run_names_what_was_exported(tmp_path, capsys):
-    file = tmp_path / "body.stl"
+def test_the_report_of_a_run_names_what_was_exported_and_recorded(tmp_path, capsys):
+    file, record = tmp_path / "body.stl", tmp_path / "run.vtkhdf"
     words = ["run", "grid2", "--seconds", "0.01", "--out", str(tmp_path / "out")]
-    assert command_line([*words, "--export", str(file)]) == 0
-    assert f"exported: {file}" in capsys.readouterr().out
+    assert command_line([*words, "--export", str(file), "--record", str(record)]) == 0
+    said = capsys.readouterr().out
+    assert f"exported: {file}" in said
+    assert f"recorded: {record}; scalpel-sim replay {record} plays it" in said
+    with SavedRun(record) as run:
+        assert run.times.tolist() == [0.0, 0.01] and len(run.rows) == 10
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, RunRecorder, SavedRun, prepare
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.cli.run_setup import perform_resumed
 from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.checkpoints import read_journal
 from scalpel_sim.runs.file_names import JOURNAL
 from scalpel_sim.scene.scene import changed
-from tests.scalpel_sim.output.killed_runs import kill_in, perform_in, physics, resume_in
+from tests.scalpel_sim.output.killed_runs import AGAIN, kill_in, perform_in, physics, resume_in
 
 GRID = changed(SCENES["grid2"], seconds=0.6)
 
@@ -61,6 +63,23 @@ def test_a_recording_of_a_run_that_was_killed_goes_on_with_it(n_frames, whole, t
     resume_in(tmp_path, record=path)
     expect_same_steps(steps_of(path)[0], steps_of(whole / "run.vtkhdf")[0])
     assert len(steps_of(path)[1]) == 600
+
+
+def test_the_command_line_knows_which_recording_to_continue(whole, tmp_path):
+    path = tmp_path / "run.vtkhdf"
+    kill_in(tmp_path, GRID, 333, record=path)
+    perform_resumed(tmp_path, AGAIN)
+    expect_same_steps(steps_of(path)[0], steps_of(whole / "run.vtkhdf")[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("run.h5", "must end in .vtkhdf"), ("nowhere/run.vtkhdf", "there is no folder")],
+)
+def test_a_file_that_cannot_be_recorded_to_is_refused_before_the_run(name, said, tmp_path, capsys):
+    words = ["run", "grid2", "--out", str(tmp_path / "out"), "--record", str(tmp_path / name)]
+    assert command_line(words) == 2
+    assert said in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_a_recording_that_is_lost_begins_anew_where_its_run_continues(tmp_path, caplog):
