@@ -2,15 +2,19 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import NamedTuple
 
 from scalpel_sim.camera.camera import Camera
+from scalpel_sim.camera.gl_context import renderer_name
 from scalpel_sim.cli.camera_options import CameraOptions
-from scalpel_sim.cli.options import ArmOptions, TissueOptions
+from scalpel_sim.cli.options import ArmOptions, TissueOptions, expect_no_options
 from scalpel_sim.cli.run_setup import check_steps_of_frames
 from scalpel_sim.cli.scene_options import chosen_scene
+from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.preparation.tissue import check_scene
+from scalpel_sim.runs.file_names import SCENE
 from scalpel_sim.runs.options import PrintOptions
 from scalpel_sim.runs.prepared_run import load_kernels
 from scalpel_sim.scene.scene import Scene
@@ -25,6 +29,27 @@ class CameraRun(NamedTuple):
     camera: Camera
 
 
+def scene_of_run(name: str | None, tissue: TissueOptions, arm: ArmOptions) -> str | None:
+    """Return the scene that a name stands for: that of a run, where it is the folder of one.
+
+    Args:
+        name: A scene, a FILE.toml, or the folder of a run; None for the default scene.
+        tissue: What is asked of the tissue.
+        arm: What is asked of the arm.
+
+    Raises:
+        UsageError: the folder has no scene, or a run is to be changed.
+    """
+    if name is None or not Path(name).is_dir():
+        return name
+    expect_no_options((tissue, arm), f"the run in {name}, which is shown as it was")
+    if not (Path(name) / SCENE).is_file():
+        raise UsageError(
+            f"{name} has no {SCENE}: it is no folder of a run, or of one whose body was elsewhere"
+        )
+    return str(Path(name) / SCENE)
+
+
 @contextmanager
 def camera_run(
     name: str | None,
@@ -35,7 +60,7 @@ def camera_run(
     *,
     records: bool = False,
 ) -> Iterator[CameraRun]:
-    """Yield a scene at its start and a camera, which has opened OpenGL: what lacks shows first.
+    """Yield a scene at its start and a camera; a lack of OpenGL shows before anything is computed.
 
     Args:
         name: A scene or a FILE.toml; None for the default one.
@@ -49,6 +74,7 @@ def camera_run(
         UsageError: options that make no sense, or no such camera.
         RenderError: no OpenGL is there.
     """
+    renderer_name()
     scene = chosen_scene(name, tissue, arm)
     check_scene(scene)
     load_kernels(printing, scene)
@@ -62,5 +88,4 @@ def camera_run(
         shadows=options.shadows,
         samples=options.samples,
     ) as camera:
-        _ = camera.renderer
         yield CameraRun(simulation, scene, camera)

@@ -8,7 +8,6 @@ from cyclopts import Parameter
 
 from scalpel_sim.cli.camera_options import CameraOptions, FilmOptions
 from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions, expect_no_options
-from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.console import log_to_stderr, say
 from scalpel_sim.runs.options import OUTPUT, PrintOptions
 
@@ -46,19 +45,22 @@ def film(
         from scalpel_sim.camera.canvas import PixelSize
         from scalpel_sim.camera.film_files import film_path, open_film
         from scalpel_sim.camera.force_panel import ForcePanel
+        from scalpel_sim.cli.camera_run import scene_of_run
         from scalpel_sim.cli.film_sources import recorded_source, simulated_source
 
         pace.check()
         path, told = film_path(output)
-        scene_file, recording = (None, None) if scene is None else _asked(scene)
-        if scene_file != scene:
+        recording = None if scene is None else _recording(Path(scene))
+        if recording is None:
+            scene = scene_of_run(scene, tissue, arm)
+        else:
             expect_no_options((tissue, arm), f"the run in {scene}, which is shown as it was")
         if told and not printing.quiet:
             say(told)
         interval = 1.0 / (pace.fps * pace.slow)
         size, panel, n_pictures = PixelSize(camera.width, camera.height), None, 0
         with (
-            simulated_source(scene_file, tissue, arm, camera, printing, interval=interval)
+            simulated_source(scene, tissue, arm, camera, printing, interval=interval)
             if recording is None
             else recorded_source(recording, camera, interval=interval)
         ) as source:
@@ -87,25 +89,11 @@ def film(
             )
 
 
-def _asked(scene: str) -> tuple[str | None, Path | None]:
-    """Return the scene, and the recording that is to be played; None: there is none.
-
-    Raises:
-        UsageError: it is a folder without a scene.
-    """
-    from scalpel_sim.runs.file_names import SCENE
+def _recording(path: Path) -> Path | None:
+    """Return the recording that a path is, or the only one in a folder; None: there is none."""
     from scalpel_sim.saved_run.layout import VTKHDF_SUFFIX
 
-    path = Path(scene)
     if path.suffix.lower() == VTKHDF_SUFFIX:
-        return None, path
-    if not path.is_dir():
-        return scene, None
-    recordings = sorted(path.glob(f"*{VTKHDF_SUFFIX}"))
-    if len(recordings) == 1:
-        return None, recordings[0]
-    if not (path / SCENE).is_file():
-        raise UsageError(
-            f"{path} has no {SCENE}: it is no folder of a run, or of one whose body was elsewhere"
-        )
-    return str(path / SCENE), None
+        return path
+    found = sorted(path.glob(f"*{VTKHDF_SUFFIX}")) if path.is_dir() else []
+    return found[0] if len(found) == 1 else None

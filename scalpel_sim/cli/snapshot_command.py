@@ -30,16 +30,16 @@ def snapshot(
     ```console
     scalpel-sim snapshot organ --at 0.8 -o organ.png
     scalpel-sim snapshot layers --at 1.2 --camera endoscope --shadows
-    scalpel-sim snapshot --at 0.8 --depth depth.png --segmentation parts.png
+    scalpel-sim snapshot out/organ --at 0.8 --depth depth.png --segmentation parts.png
     ```
 
     Args:
-        scene: What to cut.
+        scene: What to cut, as for `run`; or the folder of a run, which is done again.
         at: Simulated time of the instant [s]; default: the end of the run.
     """
     with log_to_stderr(printing):
         from scalpel_sim.camera.image_files import check_image_file, write_image
-        from scalpel_sim.cli.camera_run import camera_run
+        from scalpel_sim.cli.camera_run import camera_run, scene_of_run
         from scalpel_sim.runs.run import run_time
         from scalpel_sim.scene.checks import LONGEST_RUN
 
@@ -47,6 +47,7 @@ def snapshot(
             check_image_file(path, f"--{option}")
         if at is not None and not 0.0 <= at <= LONGEST_RUN:
             raise UsageError(f"--at is {at}; it must be a time from 0 to {LONGEST_RUN:g} s")
+        scene = scene_of_run(scene, tissue, arm)
         with camera_run(scene, tissue, arm, camera, printing) as run:
             seconds = run_time(run.simulation, run.scene.seconds) if at is None else at
             with progress(seconds, printing) as advance:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import BENCHMARKS, benchmark_line
+from benchmarks.costs import images
 from benchmarks.engine import PRECISION_OF_LAW, EngineLoops, jittered_block
 from benchmarks.frame import Stopwatches, Trace, trace_frame
 from benchmarks.scaling import (
@@ -134,3 +135,14 @@ def test_wrong_arguments_of_a_benchmark_are_refused(words, expected, capsys):
     assert out == ""
     (line,) = (x for x in err.splitlines() if not x.startswith("compiling"))
     assert re.search(expected, line)
+
+
+def test_images_are_timed_beside_the_simulation_that_they_show(renderer):
+    found = images("slab", side=32, runs=1).measurements
+    assert all(map(is_sane, found))
+    by_case = {each.case: each.median for each in found}
+    share = by_case["image, over 20 ms of simulation"]
+    assert share == pytest.approx(
+        100.0 * by_case["image"] / by_case["20 ms of simulation"], rel=0.01
+    )
+    assert by_case["a further camera"] < by_case["image"] < by_case["all three"]

@@ -40,7 +40,10 @@ def test_its_files_hold_what_a_camera_sees_at_that_instant(taken, tmp_path, caps
     with Image.open(ids_png) as picture:
         assert (np.asarray(picture) == image.segmentation).all()
         assert json.loads(picture.text["ids"]) == dict(camera.ids) == found["ids"]
-        assert picture.mode == "P" and len(set(picture.convert("RGB").get_flattened_data())) > 3
+        assert (
+            picture.mode == "P"
+            and len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 3
+        )
     steps, there = np.asarray(Image.open(depth_png)), image.segmentation > 0
     assert steps.dtype == np.uint16 and (steps[~there] == 0).all()
     assert np.abs(1e-4 * steps - image.depth)[there].max() <= 0.51e-4
@@ -54,6 +57,16 @@ def test_it_says_in_a_line_what_is_to_be_seen(tmp_path, capsys):
     assert command_line(asked) == EXIT_OK
     (line,) = capsys.readouterr().out.splitlines()
     assert line.startswith(f"{path}: slab after 0.000 s: ") and "skin" in line and "blade" in line
+
+
+def test_of_a_run_in_a_folder_it_shows_that_instant(taken, tmp_path, capsys):
+    out, path = tmp_path / "out", tmp_path / "a.png"
+    assert command_line(["run", "slab", "--seconds", "0.1", "-q", "--out", str(out)]) == EXIT_OK
+    asked = ["snapshot", str(out), "--at", "0.06", "--camera", "endoscope", *SMALL, "-o", str(path)]
+    assert command_line(asked) == EXIT_OK
+    assert (np.asarray(Image.open(path)) == taken[0].rgb).all()
+    assert command_line([*asked, "--toughness", "3"]) == EXIT_WRONG_USE
+    assert "toughness" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
