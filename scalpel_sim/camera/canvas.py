@@ -1,5 +1,6 @@
 """Draws a MuJoCo model, and triangle meshes that change, into arrays. No screen is needed."""
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -208,18 +209,20 @@ class Canvas:
         Returns:
             Places in the list, shape (height, width); and the list.
         """
-        places, things, _ = self.numbers_and_depth(size)
-        return places, things
+        return self._numbers(size, depth=False)[:2]
 
     def numbers_and_depth(self, size: PixelSize) -> tuple[IntArray, list[Thing], np.ndarray]:
         """Return `numbers` and `depth` of one drawing."""
+        return self._numbers(size, depth=True)
+
+    def _numbers(self, size: PixelSize, *, depth: bool) -> tuple[IntArray, list[Thing], np.ndarray]:
         with self._as_numbers():
-            colours, depth = self._drawn(size, colours=True, depth=True)
+            colours, metres = self._drawn(size, colours=True, depth=depth)
         own = self._appended
         geoms = self._scene.geoms[: self._scene.ngeom - len(own)]
         things = [Thing(None, int(geom.objtype), int(geom.objid)) for geom in geoms]
         things += [Thing(name) for name in own]
-        return colours.astype(np.int64) @ np.array([1, 256, 65536]) - 1, things, depth
+        return colours.astype(np.int64) @ np.array([1, 256, 65536]) - 1, things, metres
 
     @contextmanager
     def _as_numbers(self) -> Iterator[None]:
@@ -244,6 +247,11 @@ class Canvas:
                 self._context.free()
             self._gl.free()
         self._gl = self._context = None
+
+    def __del__(self) -> None:
+        # MuJoCo would free its textures and lists in the context that is current: another canvas's.
+        if not sys.is_finalizing() and getattr(self, "_gl", None) is not None:
+            self.close()
 
     @property
     def far(self) -> float:

@@ -15,7 +15,7 @@ from scalpel_sim.camera.canvas import Canvas, PixelSize
 from scalpel_sim.camera.finishes import Finish
 from scalpel_sim.camera.lights import Light
 from scalpel_sim.camera.viewpoints import Viewpoint
-from scalpel_sim.viewer import primitives
+from scalpel_sim.viewer import primitives, textures
 from tests.support.egl import needs_renderer
 
 pytestmark = needs_renderer
@@ -140,6 +140,26 @@ def test_a_picture_lies_on_a_mesh_by_its_texture_coordinates():
     canvas.look(above, lights=[])
     picture = canvas.colours(PixelSize(32, 32)).astype(int)
     assert picture[12, 16, 0] > picture[12, 16, 2] and picture[20, 16, 2] > picture[20, 16, 0]
+
+
+def lit_ball() -> Canvas:
+    """Return a canvas that sees a ball."""
+    canvas = Canvas(finishes={"ball": Finish(picture=textures.skin())})
+    uv = BALL.positions[:, :2] / 0.03
+    canvas.put("ball", BALL._replace(uv=uv))
+    canvas.look(FROM_FRONT, lights=[Light((0.0, 1.0, 0.0))])
+    return canvas
+
+
+def test_a_canvas_that_is_dropped_leaves_the_others_alone():
+    kept, dropped = lit_ball(), lit_ball()
+    before = kept.colours(PixelSize(48, 48))
+    assert before.any() and (dropped.colours(PixelSize(48, 48)) == before).all()
+    kept.colours(PixelSize(48, 48))  # its OpenGL is the current one
+    del dropped
+    assert (kept.colours(PixelSize(48, 48)) == before).all()
+    kept.close()
+    assert (kept.colours(PixelSize(48, 48)) == before).all()
 
 
 def resident() -> int:
