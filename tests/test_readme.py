@@ -26,6 +26,7 @@ HELPS = (
     "replay",
     "export",
     "snapshot",
+    "trace",
     "film",
     "explain",
     "serve",

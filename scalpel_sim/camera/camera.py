@@ -10,7 +10,7 @@ import numpy as np
 from scalpel_sim.camera.canvas import Canvas, PixelSize, Thing
 from scalpel_sim.camera.finishes import POLISHED_STEEL
 from scalpel_sim.camera.identities import Identities
-from scalpel_sim.camera.lenses import sight_through
+from scalpel_sim.camera.lenses import pixels_through, sight_through
 from scalpel_sim.camera.lights import WALL_COLOUR, Light, usual_lights
 from scalpel_sim.camera.theatre import Theatre, theatre_of
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
@@ -214,6 +214,16 @@ class Camera:
         canvas = self._stage.canvas
         canvas.look(self._view, self._stage.theatre.data, self.lights)
         return sight_through(canvas.lenses, *self._size, pixels)
+
+    def pixels_of(self, points: FloatArray) -> FloatArray:
+        """Return where points are in the image, as columns and rows, shape (n, 2).
+
+        Args:
+            points: Before the camera [m], world frame, shape (n, 3).
+        """
+        canvas = self._stage.canvas
+        canvas.look(self._view, self._stage.theatre.data, self.lights)
+        return pixels_through(canvas.lenses, *self._size, points)
 
     def close(self) -> None:
         """Free what OpenGL holds, of all cameras that come of one another."""

@@ -61,13 +61,42 @@ def sight_through(
     Returns:
         The eye, shape (3,), and the vectors, shape (n, 3); world frame.
     """
+    eye, axes, (left, top, wide, high) = _picture(lenses, width / height)
+    across = left + pixels[:, 0] / width * wide
+    upward = top - pixels[:, 1] / height * high
+    ways = np.column_stack([across, upward, np.ones(len(pixels))]) @ axes
+    return eye, ways / np.linalg.norm(ways, axis=1)[:, None]
+
+
+def pixels_through(
+    lenses: Sequence[mujoco.MjvGLCamera], width: int, height: int, points: FloatArray
+) -> FloatArray:
+    """Return where points are in a picture, as columns and rows, shape (n, 2).
+
+    Args:
+        lenses: Both eyes of a scene.
+        width: Width of the picture [pixels].
+        height: Its height.
+        points: Before the eyes [m], world frame, shape (n, 3).
+    """
+    eye, axes, (left, top, wide, high) = _picture(lenses, width / height)
+    across, upward, deep = axes @ (points - eye).T
+    columns = (across / deep - left) / wide * width
+    return np.column_stack([columns, (top - upward / deep) / high * height])
+
+
+def _picture(
+    lenses: Sequence[mujoco.MjvGLCamera], aspect: float
+) -> tuple[FloatArray, FloatArray, tuple[float, float, float, float]]:
+    """Return the eye [m], the axes right, up and forward, and the picture at a depth of 1.
+
+    The picture is its left side, its upper side, its width and its height.
+    """
     names = ("pos", "forward", "up")
     eye, forward, up = (np.mean([getattr(each, name) for each in lenses], axis=0) for name in names)
-    lens = lenses[0]
-    high = lens.frustum_top - lens.frustum_bottom
-    wide = 2.0 * lens.frustum_width or high * width / height
-    right = np.cross(forward, up)
-    across = lens.frustum_center + (pixels[:, 0] / width - 0.5) * wide
-    upward = lens.frustum_top - pixels[:, 1] / height * high
-    ways = lens.frustum_near * forward + np.outer(across, right) + np.outer(upward, up)
-    return eye, ways / np.linalg.norm(ways, axis=1)[:, None]
+    lens, near = lenses[0], lenses[0].frustum_near
+    high = (lens.frustum_top - lens.frustum_bottom) / near
+    wide = 2.0 * lens.frustum_width / near or high * aspect
+    left = lens.frustum_center / near - 0.5 * wide
+    axes = np.stack([np.cross(forward, up), up, forward])
+    return eye, axes, (left, lens.frustum_top / near, wide, high)

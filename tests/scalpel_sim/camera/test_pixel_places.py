@@ -50,6 +50,8 @@ def test_a_pixel_shows_the_place_of_the_material_that_is_drawn_there(organ):
     now = tissue.positions_of(tissue.material_points(points))
     back = projected(organ, organ.theatre.frame.points_to_world(now))
     assert np.linalg.norm(back - pixels, axis=1).max() < 0.5
+    world = organ.theatre.frame.points_to_world(now)
+    np.testing.assert_allclose(organ.pixels_of(world), back, atol=1e-3)
     assert np.linalg.norm(now - points, axis=1).max() > 1e-4, "the body has moved"
 
 
