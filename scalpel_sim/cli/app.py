@@ -25,7 +25,7 @@ from scalpel_sim.cli.options import (
 from scalpel_sim.cli.recording_commands import export, replay
 from scalpel_sim.cli.snapshot_command import snapshot
 from scalpel_sim.cli.spacemouse_command import spacemouse
-from scalpel_sim.cli.trace_command import trace_line
+from scalpel_sim.cli.trace_command import cut_along_pixels
 from scalpel_sim.cli.validate_command import perform_case, validate
 from scalpel_sim.cli.view_command import view
 from scalpel_sim.cli.warm_up_command import warm_up
@@ -146,7 +146,7 @@ def _run(
 app.command(view)
 app.command(snapshot)
 app.command(film)
-app.command(trace_line, name="trace")
+app.command(cut_along_pixels, name="trace")
 app.command(replay)
 app.command(export)
 app.command(explain)

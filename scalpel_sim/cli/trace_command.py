@@ -31,7 +31,7 @@ class LineOptions:
     "Replace the file if it exists."
 
 
-def trace_line(
+def cut_along_pixels(
     scene: SceneName = None,
     /,
     *,
