@@ -3,6 +3,8 @@
 import logging
 import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,10 @@ from scalpel_sim.errors import writing
 from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, Describe, GrowingTable, LaidOutFile
 from tissue.support import remove_unfinished, whole_file
 
+NEARLY_FULL = 0.6
+"""Share of its room that a table may use before more is made. Meanwhile the others must last: a
+copy takes seconds, and the room is that of half a minute or more."""
+
 _log = logging.getLogger(__name__)
 
 _INSTEAD = "another --record"
@@ -20,16 +26,25 @@ _UNFINISHED = ".part"
 """Ending of a file that is not in place, which `remove_unfinished` knows."""
 
 
+@dataclass
+class _Growth:
+    """A file with more room that a thread makes."""
+
+    file: "Future[LaidOutFile]"
+    copied: dict[str, int]
+    """Rows of each table that it has, of those that are still the same."""
+
+
 class GrowingTables:
     """Tables to which rows are added: see `LaidOutFile`.
 
-    The file appears under its name with the first step. Where there is too little room for more,
-    one with twice as much is laid out, and replaces it.
+    The file appears under its name with the first step. Before the room of a table is used up, a
+    thread lays out a file with twice as much, which then replaces it: nothing waits for the copy.
 
     Args:
         path: The file; one that is there is replaced by the first step.
         tables: The tables; `STEP_TIMES` is one of them.
-        describe: Writes what does not grow.
+        describe: Writes what does not grow; also called by that thread.
 
     Raises:
         RunError: the system refuses, or this version of HDF5 lays files out otherwise.
@@ -41,9 +56,12 @@ class GrowingTables:
         self._describe = describe
         self._lengths = dict.fromkeys(self._tables, 0)
         self._n_files = 0
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="recording")
+        self._growth: _Growth | None = None
+        self._grows_early = True
         with writing(path, _INSTEAD):
             remove_unfinished(path)
-            self._file = self._new_file()
+            self._file = self._new_file(self._next_path())
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -80,8 +98,10 @@ class GrowingTables:
         numbers = np.ascontiguousarray(rows, table.kind).reshape(-1, *table.width)
         end = first + len(numbers)
         with writing(self.path, _INSTEAD):
-            if not self._file.has_room(name, end):
-                self._make_room(name, end)
+            while not self._file.has_room(name, end):
+                if self._growth is None:
+                    self._begin_growth({name: end})
+                self._end_growth()
             self._file.write(name, first, numbers.tobytes())
         self._lengths[name] = end
         return first
@@ -95,6 +115,14 @@ class GrowingTables:
         with writing(self.path, _INSTEAD):
             self._file.show(self._lengths)
             self._put_in_place()
+            if self._growth is None:
+                if self._grows_early and self._is_nearly_full:
+                    self._begin_growth({})
+            elif self._growth.file.done():
+                if self._growth.file.exception() is None:
+                    self._end_growth()
+                else:  # it is tried again where there is no room at all, and raises there
+                    self._grows_early, self._growth = False, None
 
     def cut_back(self, lengths: Sequence[int]) -> None:
         """Take off what was added after `lengths` were these; at least one step stays.
@@ -103,6 +131,9 @@ class GrowingTables:
             RunError: the system refuses.
         """
         self._lengths = dict(zip(self._lengths, map(int, lengths), strict=True))
+        if self._growth is not None:
+            copied = self._growth.copied
+            self._growth.copied = {n: min(copied[n], k) for n, k in self._lengths.items()}
         with writing(self.path, _INSTEAD):
             self._file.show(self._lengths)
 
@@ -117,10 +148,12 @@ class GrowingTables:
             RunError: the system refuses.
         """
         self._lengths = dict(zip(self._lengths, map(int, lengths), strict=True))
-        for name, n_rows in self._lengths.items():
-            self._reserve(name, n_rows)
+        self._reserve(self._lengths)
         with writing(self.path, _INSTEAD):
-            self._replace_file(self.path, starts)
+            self._file.close()
+            self._file.path.unlink()
+            self._file = self._new_file(self._next_path())
+            self._file.copy(self.path, starts, self._lengths)
             self._file.show(self._lengths)
             self._put_in_place()
 
@@ -129,7 +162,7 @@ class GrowingTables:
 
         Where the system refuses, that is logged, and the file stays as it is, with all steps.
         """
-        starts, is_in_place = self._file.starts, self._file.path == self.path
+        starts, is_in_place = self._file.starts, self._is_in_place
         self.close()
         if not is_in_place:
             return
@@ -152,15 +185,34 @@ class GrowingTables:
 
     def close(self) -> None:
         """Close the file as it is. May be called twice."""
+        self._thread.shutdown()
+        if self._growth is not None:
+            if self._growth.file.exception() is None:
+                unused = self._growth.file.result()
+                unused.close()
+                unused.path.unlink(missing_ok=True)
+            self._growth = None
         self._file.close()
-        if self._file.path != self.path:
+        if not self._is_in_place:
             self._file.path.unlink(missing_ok=True)
 
-    def _new_file(self) -> LaidOutFile:
-        """Lay out a file under a name that is not the one of the file."""
+    @property
+    def _is_in_place(self) -> bool:
+        """Whether the file has its name."""
+        return self._file.path == self.path
+
+    @property
+    def _is_nearly_full(self) -> bool:
+        """Whether a table has little room left."""
+        return any(n > NEARLY_FULL * self._tables[name].room for name, n in self._lengths.items())
+
+    def _next_path(self) -> Path:
+        """Return a name of a file that is not in place."""
         self._n_files += 1
-        name = f".{self.path.name}.{os.getpid()}-{self._n_files}{_UNFINISHED}"
-        path = self.path.with_name(name)
+        return self.path.with_name(f".{self.path.name}.{os.getpid()}-{self._n_files}{_UNFINISHED}")
+
+    def _new_file(self, path: Path) -> LaidOutFile:
+        """Lay out a file; where that fails, there is none."""
         try:
             return LaidOutFile(path, self._tables.values(), self._describe)
         except BaseException:
@@ -169,40 +221,61 @@ class GrowingTables:
 
     def _put_in_place(self) -> None:
         """Give the file its name."""
-        if self._file.path != self.path:
+        if not self._is_in_place:
             self._file.move_to(self.path)
 
-    def _reserve(self, name: str, n_rows: int) -> None:
-        """Double the room of a table until it takes so many rows, in the next file."""
-        room = max(self._tables[name].room, 1)
-        while room < n_rows:
-            room *= 2
-        self._tables[name] = self._tables[name]._replace(room=room)
+    def _reserve(self, n_rows: Mapping[str, int]) -> None:
+        """Double the room of tables, in the next file, until they take so many rows."""
+        for name, n in n_rows.items():
+            room = max(self._tables[name].room, 1)
+            while room < n:
+                room *= 2
+            self._tables[name] = self._tables[name]._replace(room=room)
 
-    def _make_room(self, name: str, n_rows: int) -> None:
-        """Continue in a file with room for so many rows of a table."""
-        self._reserve(name, n_rows)
-        was_in_place, shown = self._file.path == self.path, self._file.shown
-        self._replace_file(self._file.path, self._file.starts)
-        if was_in_place:
-            self._file.show(shown)
-            self._put_in_place()
-
-    def _replace_file(self, source: Path, starts: Mapping[str, int]) -> None:
-        """Continue in a new file that has the rows of a file before.
+    def _begin_growth(self, n_rows: Mapping[str, int]) -> None:
+        """Begin to make a file with more room.
 
         Args:
-            source: That file.
-            starts: Where its tables begin [bytes].
+            n_rows: Rows that there must be room for in some tables.
         """
-        old, new = self._file, self._new_file()
+        nearly = {
+            name: 2 * each.room
+            for name, each in self._tables.items()
+            if self._lengths[name] > NEARLY_FULL * each.room
+        }
+        self._reserve(nearly)
+        self._reserve(n_rows)
+        path, source, starts = self._next_path(), self._file.path, self._file.starts
+        copied = dict(self._lengths)
+
+        def grown() -> LaidOutFile:
+            file = self._new_file(path)
+            try:
+                file.copy(source, starts, copied)
+            except BaseException:
+                file.close()
+                path.unlink(missing_ok=True)
+                raise
+            return file
+
+        self._growth = _Growth(self._thread.submit(grown), copied)
+
+    def _end_growth(self) -> None:
+        """Continue in the file with more room, once it is made."""
+        assert self._growth is not None
+        growth, self._growth = self._growth, None
+        file, old = growth.file.result(), self._file
         try:
-            new.copy(source, starts, self._lengths)
+            file.copy(old.path, old.starts, self._lengths, growth.copied)
+            if self._is_in_place:
+                file.show(old.shown)
         except BaseException:
-            new.close()
-            new.path.unlink(missing_ok=True)
+            file.close()
+            file.path.unlink(missing_ok=True)
             raise
-        self._file = new
+        self._file = file
         old.close()
-        if old.path != self.path:
-            old.path.unlink(missing_ok=True)
+        if old.path == self.path:
+            self._put_in_place()
+        else:
+            old.path.unlink()

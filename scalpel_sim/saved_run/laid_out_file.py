@@ -16,6 +16,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 import numpy as np
@@ -151,19 +152,27 @@ class LaidOutFile:
         """
         self._write(self._places[name].data + first * self._tables[name].row_bytes, content)
 
-    def copy(self, source: Path, starts: Mapping[str, int], lengths: Mapping[str, int]) -> None:
+    def copy(
+        self,
+        source: Path,
+        starts: Mapping[str, int],
+        lengths: Mapping[str, int],
+        after: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:
         """Copy the first rows of all tables from another file.
 
         Args:
             source: That file.
             starts: Where its tables begin [bytes].
             lengths: Numbers of rows.
+            after: Numbers of rows that are here already.
         """
         with source.open("rb", buffering=0) as file:
             for name, table in self._tables.items():
-                file.seek(starts[name])
-                place, left = self._places[name].data, lengths[name] * table.row_bytes
-                while left:
+                here = after.get(name, 0) * table.row_bytes
+                file.seek(starts[name] + here)
+                place, left = self._places[name].data + here, lengths[name] * table.row_bytes - here
+                while left > 0:
                     content = file.read(min(left, _BYTES_PER_COPY))
                     if not content:
                         raise OSError(f"{source} is shorter than it was")

@@ -1,5 +1,7 @@
 """Tables of a file that grows are read by HDF5 as they were shown last, at any time."""
 
+import time
+
 import h5py
 import numpy as np
 import pytest
@@ -7,6 +9,9 @@ import pytest
 from scalpel_sim.errors import RunError
 from scalpel_sim.saved_run.growing_tables import GrowingTables
 from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, GrowingTable
+
+PATIENCE = 30.0
+"""How long a thread may take to copy some kilobytes [s]: the machine may be busy."""
 
 TABLES = (
     GrowingTable(STEP_TIMES, "f8", room=2),
@@ -82,6 +87,45 @@ def test_steps_that_are_taken_off_are_written_again(tables):
         tables.commit()
     n, pairs = read(tables.path)
     assert n == 30 and np.array_equal(pairs, pairs_until(30))
+
+
+def test_more_room_is_made_before_there_is_none_and_steps_go_on_meanwhile(tmp_path):
+    roomy = tuple(each._replace(room=400) for each in TABLES)
+    tables = GrowingTables(tmp_path / "run.vtkhdf", roomy, lambda _: None)
+    lengths = []
+    for i in range(24):  # 276 pairs: more than six tenths
+        add_step(tables, i)
+        tables.commit()
+        lengths.append(tables.lengths)
+        if i == 0:
+            before = tables.path.stat().st_size
+    tables.cut_back(lengths[19])
+    for i in range(20, 28):
+        add_step(tables, i)
+        tables.commit()
+    end = time.monotonic() + PATIENCE
+    while tables.path.stat().st_size == before and time.monotonic() < end:
+        time.sleep(0.01)
+        tables.commit()
+    assert tables.lengths[1] < 400 and tables.path.stat().st_size == before + 400 * 8
+    n, pairs = read(tables.path)
+    assert n == 28 and np.array_equal(pairs, pairs_until(28))
+    tables.finish()
+    assert read(tables.path)[0] == 28 and [each.name for each in tmp_path.iterdir()] == [
+        "run.vtkhdf"
+    ]
+
+
+def test_a_recording_that_ends_while_room_is_made_leaves_one_file(tmp_path):
+    roomy = tuple(each._replace(room=400) for each in TABLES)
+    tables = GrowingTables(tmp_path / "run.vtkhdf", roomy, lambda _: None)
+    for i in range(24):
+        add_step(tables, i)
+        tables.commit()
+    tables.finish()
+    n, pairs = read(tables.path)
+    assert n == 24 and np.array_equal(pairs, pairs_until(24))
+    assert [each.name for each in tmp_path.iterdir()] == ["run.vtkhdf"]
 
 
 def test_in_the_end_there_is_no_room_left_and_empty_tables_are_empty(tables):
