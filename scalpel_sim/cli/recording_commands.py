@@ -80,7 +80,7 @@ def export(
     ```
 
     Args:
-        file: The recording.
+        file: The recording, also of a run that goes on or was killed; or a folder with one in it.
         out: The file to write.
         at: Simulated time: the last step is written that is not after it [s; default: the end].
     """
@@ -88,7 +88,8 @@ def export(
         from scalpel_sim.saved_run.playback import export_step
         from scalpel_sim.saved_run.saved_run import SavedRun
 
-        with SavedRun(file) as run:
+        path = _recording_in(file) if file.is_dir() else file
+        with SavedRun(path) as run:
             step = export_step(run, at, out)
             if printing.json:
                 print(json.dumps({"file": str(out), "time_s": step.time, "step": step.number}))

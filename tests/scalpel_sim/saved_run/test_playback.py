@@ -53,8 +53,9 @@ def test_of_a_folder_its_replay_or_its_one_recording_is_played(recorded, tmp_pat
     assert "has neither a replay nor a recording" in capsys.readouterr().err
     for name in ("a", "b"):
         (tmp_path / f"{name}.vtkhdf").touch()
-    assert command_line(["replay", str(tmp_path)]) == 2
-    assert "choose one of a.vtkhdf, b.vtkhdf" in capsys.readouterr().err
+    for words in (["replay", str(tmp_path)], ["export", str(tmp_path), "-o", "x.stl"]):
+        assert command_line(words) == 2
+        assert "choose one of a.vtkhdf, b.vtkhdf" in capsys.readouterr().err
 
 
 def test_shapes_are_read_as_they_were(recorded):
