@@ -8,7 +8,7 @@ import pytest
 from scalpel_sim import SCENES, RunRecorder, SavedRun, prepare
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.cli.run_setup import perform_resumed
-from scalpel_sim.errors import UsageError
+from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.runs.checkpoints import read_journal
 from scalpel_sim.runs.file_names import JOURNAL
 from scalpel_sim.scene.scene import changed
@@ -90,6 +90,15 @@ def test_a_recording_that_is_lost_begins_anew_where_its_run_continues(tmp_path, 
     begin = re.search(r"cannot be continued .*; it begins anew at (0\.\d+) s", caplog.text)
     steps, _, _ = steps_of(path)
     assert steps[0].time == float(begin[1]) and steps[-1].time == 0.6
+
+
+def test_a_run_that_nobody_begins_leaves_no_recording(tmp_path):
+    def give_up():
+        raise RunError("nobody came")
+
+    with pytest.raises(RunError, match="nobody came"):
+        perform_in(tmp_path, GRID, record=tmp_path / "run.vtkhdf", before_frames=give_up)
+    assert not list(tmp_path.glob("*run.vtkhdf*"))
 
 
 def test_a_recording_goes_back_with_its_simulation(whole, tmp_path):
