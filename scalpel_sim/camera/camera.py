@@ -15,12 +15,12 @@ from scalpel_sim.camera.lights import WALL_COLOUR, Light, usual_lights
 from scalpel_sim.camera.theatre import Theatre, theatre_of
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
 from scalpel_sim.camera.viewpoints import (
-    OVERVIEW,
     Viewpoint,
     camera_names,
     expect_camera,
     model_cameras,
     shipped_viewpoint,
+    usual_camera,
     viewpoint_of,
 )
 from scalpel_sim.errors import UsageError
@@ -59,7 +59,8 @@ class Camera:
     Args:
         sees: A simulation; or a `Theatre`, for a loop of your own.
         name: A `[[view]]` of the scene, a camera of the model, or `overview` or `endoscope`, which
-            are always there: for arms and body as they are when the camera is made.
+            are always there: for arms and body as they are when the camera is made. None: the
+            first view, which pages show at the start; without views the overview.
         width: Width of the images [pixels].
         height: Height of the images [pixels].
         shadows: Whether lamps cast shadows: an image then takes several times as long.
@@ -74,7 +75,7 @@ class Camera:
     def __init__(
         self,
         sees: Simulation | Theatre,
-        name: str = OVERVIEW,
+        name: str | None = None,
         *,
         width: int = 640,
         height: int = 480,
@@ -84,7 +85,7 @@ class Camera:
     ) -> None:
         theatre = sees if isinstance(sees, Theatre) else theatre_of(sees)
         self._stage = _Stage(theatre, shadows=shadows, samples=samples)
-        self._aim(name, PixelSize(width, height), lights)
+        self._aim(name or usual_camera(theatre.views), PixelSize(width, height), lights)
 
     def another(
         self,

@@ -100,6 +100,11 @@ def shipped_viewpoint(
     return Viewpoint(centre + distance * way, centre, fov_degrees=ENDOSCOPE_FOV)
 
 
+def usual_camera(views: Sequence[ViewTable]) -> str:
+    """Return the name of the camera where none is asked for: the first view, else the overview."""
+    return views[0].name if views else OVERVIEW
+
+
 def camera_names(views: Sequence[ViewTable], model: mujoco.MjModel) -> list[str]:
     """Return the names of all cameras: of the scene, of the model, and those always there."""
     names = [*(view.name for view in views), *model_cameras(model), *SHIPPED]

@@ -17,9 +17,9 @@ CAMERA = Group("Camera", sort_key=6)
 class CameraOptions:
     """A camera, and its images."""
 
-    camera: str = "overview"
+    camera: str | None = None
     """A [[view]] of the scene, a camera of the arm's model, or overview or endoscope, which are
-    always there."""
+    always there [default: the first view, or overview]."""
     width: int = 640
     "Width of the image [pixels]."
     height: int = 480

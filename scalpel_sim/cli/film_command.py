@@ -73,7 +73,7 @@ def film(
                     n_pictures += 1
         found = {
             "scene": source.title,
-            "camera": camera.camera,
+            "camera": source.camera,
             "file": str(path),
             "pictures": n_pictures,
             "fps": pace.fps,

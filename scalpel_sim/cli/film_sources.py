@@ -12,7 +12,7 @@ from scalpel_sim.camera.canvas import PixelSize
 from scalpel_sim.camera.film import film_frames
 from scalpel_sim.camera.force_panel import ForcePanel
 from scalpel_sim.camera.played_camera import PlayedCamera
-from scalpel_sim.camera.viewpoints import OVERVIEW
+from scalpel_sim.camera.viewpoints import usual_camera
 from scalpel_sim.cli.camera_options import CameraOptions
 from scalpel_sim.cli.camera_run import camera_run
 from scalpel_sim.cli.options import ArmOptions, TissueOptions
@@ -32,6 +32,8 @@ class FilmSource(NamedTuple):
     """Name of the scene."""
     seconds: float
     """Time that it lasts, as far as is known [s]."""
+    camera: str
+    """Name of the camera."""
     graspers: Sequence[str]
     """Names of its graspers."""
     pictures: MakePictures
@@ -76,7 +78,8 @@ def simulated_source(
                 )
 
             names = [each.name for each in run.simulation.graspers]
-            yield FilmSource(run.scene.name, seconds, names, pictures, run.camera.renderer)
+            title, name, renderer = run.scene.name, run.camera.name, run.camera.renderer
+            yield FilmSource(title, seconds, name, names, pictures, renderer)
 
 
 @contextmanager
@@ -103,7 +106,8 @@ def recorded_source(path: Path, camera: CameraOptions, *, interval: float) -> It
             shadows=camera.shadows,
             samples=camera.samples,
         )
-        played.aim(camera.camera or OVERVIEW, stage.views, first.surface, first.body_poses)
+        name = camera.camera or usual_camera(stage.views)
+        played.aim(name, stage.views, first.surface, first.body_poses)
         size = PixelSize(camera.width, camera.height)
 
         def pictures(panel: ForcePanel | None) -> Iterator[np.ndarray]:
@@ -123,7 +127,8 @@ def recorded_source(path: Path, camera: CameraOptions, *, interval: float) -> It
 
         title = run.title.partition(":")[0]
         try:
-            yield FilmSource(title, float(run.times[-1]), run.graspers, pictures, played.renderer())
+            seconds, renderer = float(run.times[-1]), played.renderer()
+            yield FilmSource(title, seconds, name, run.graspers, pictures, renderer)
         finally:
             played.close()
 

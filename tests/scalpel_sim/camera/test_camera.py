@@ -261,6 +261,7 @@ def test_views_of_the_scene_come_first_and_are_where_it_says():
     view = SCENES["retract"].views[0]
     camera = Camera(simulation, view.name, width=32, height=32)
     assert camera.names[0] == view.name and camera.names[-2:] == ["overview", "endoscope"]
+    assert Camera(simulation).name == view.name
     eye = simulation.frame.points_to_world(np.array(view.eye))
     assert np.allclose(place_of(camera).eye, eye)
 
