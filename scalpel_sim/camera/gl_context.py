@@ -47,11 +47,14 @@ def open_context() -> Any:
     try:
         context = importlib.import_module(f"mujoco.{backend}").GLContext(1, 1)
         context.make_current()
+        if backend == "glfw" and not _names():  # it warns where it finds no screen, and goes on
+            raise RuntimeError("it needs a screen")
     # The libraries that are missing show as any of these.
     except (ImportError, AttributeError, RuntimeError, OSError) as error:
+        otherwise = "" if backend == "egl" else f", and unset {_BACKEND}"
         raise RenderError(
             f"images cannot be drawn: there is no OpenGL by {backend.upper()} ({_reason(error)}). "
-            f"On Debian and Ubuntu: apt-get install {RENDERER_PACKAGES}"
+            f"On Debian and Ubuntu: apt-get install {RENDERER_PACKAGES}{otherwise}"
         ) from error
     _opened_in.add(os.getpid())
     return context
@@ -110,9 +113,14 @@ def renderer_name() -> str:
 
 def current_renderer() -> str:
     """Return the names of renderer and version of the context that is current."""
+    return ", OpenGL ".join(_names())
+
+
+def _names() -> list[str]:
+    """Return the names of renderer and version; none where no context is current."""
     gl = importlib.import_module("OpenGL.GL")
     names = (gl.glGetString(each) for each in (gl.GL_RENDERER, gl.GL_VERSION))
-    return ", OpenGL ".join(name.decode("ascii", "replace") for name in names)
+    return [name.decode("ascii", "replace") for name in names if name is not None]
 
 
 def _reason(error: Exception) -> str:

@@ -210,6 +210,14 @@ def test_without_a_driver_one_line_names_the_packages(tmp_path):
     assert "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libgl1" in last
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere GLFW is the usual one")
+def test_a_backend_that_needs_a_screen_says_so_where_there_is_none():
+    code = "from scalpel_sim.camera.gl_context import renderer_name; renderer_name()"
+    failed = in_a_process(code, MUJOCO_GL="glfw")
+    last = failed.stderr.strip().splitlines()[-1]
+    assert "there is no OpenGL by GLFW" in last and last.endswith("and unset MUJOCO_GL")
+
+
 FORKS = """
 import os
 import numpy as np
