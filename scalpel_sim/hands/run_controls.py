@@ -185,6 +185,8 @@ class RunResults(NamedTuple):
     """Folder of its files."""
     replay: str
     """Path of the replay; empty: there is none."""
+    report: str = ""
+    """Path of the report; empty: there is none."""
 
 
 class RunControls:

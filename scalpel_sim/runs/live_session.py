@@ -20,7 +20,7 @@ from scalpel_sim.output.report import headline
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.runs.console import print_report, say, wait_until
 from scalpel_sim.runs.device_run import DeviceRun, device_run, perform_device
-from scalpel_sim.runs.file_names import REPLAY
+from scalpel_sim.runs.file_names import REPLAY, REPORT
 from scalpel_sim.runs.options import DeviceOptions, PageOptions
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import perform
@@ -258,9 +258,12 @@ def _as_begin(asked: Begin | CutLines, before: Begin) -> Begin:
 
 def results_of(summary: Summary, folder: Path) -> RunResults:
     """Return what a run has given, for its page."""
-    replay = folder.resolve() / REPLAY
+    replay, report = (folder.resolve() / name for name in (REPLAY, REPORT))
     return RunResults(
-        headline(summary), str(folder.resolve()), str(replay) if replay.is_file() else ""
+        headline(summary),
+        str(folder.resolve()),
+        str(replay) if replay.is_file() else "",
+        str(report) if report.is_file() else "",
     )
 
 

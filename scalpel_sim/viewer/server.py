@@ -37,7 +37,7 @@ from scalpel_sim.viewer.messages import (
     ViewerSettings,
 )
 from scalpel_sim.viewer.scene_packets import ScenePackets
-from scalpel_sim.viewer.site import PageRequest, ReplayRequest, Site
+from scalpel_sim.viewer.site import FileRequest, PageRequest, Site
 
 LOOPBACK = "127.0.0.1"
 """The only address that is listened on: no other machine can see the run or slow it down."""
@@ -284,8 +284,12 @@ async def serve(newest: NewestState) -> None:
         open_pages.add_forces(newest.take_forces())
         open_pages.show(state)
         if state is not None and state.live is not None and state.live.run.results is not None:
-            replay = state.live.run.results.replay
-            site.replay = Path(replay) if replay else None
+            results = state.live.run.results
+            site.files = {
+                name: Path(path)
+                for name, path in (("replay", results.replay), ("report", results.report))
+                if path
+            }
         if has_ended:
             break
         await has_changed.wait()
@@ -321,7 +325,7 @@ def _start(site: Site, open_pages: OpenPages, port: int | None) -> StartReply:
         OWN_NAMES,
         [
             (r"/", PageRequest, {"site": site}),
-            (r"/replay", ReplayRequest, {"site": site}),
+            (r"/(replay|report)", FileRequest, {"site": site}),
             (
                 r"/frames",
                 PageSocket,

@@ -21,9 +21,9 @@ _HOW_TO_LEAD = "Drag with the right button to turn the view."
 N_BYTES_OF_TOKEN = 32
 """Random bytes in the token of a page that controls its run: nobody guesses it."""
 
-POLICY_OF_REPLAY = "sandbox allow-scripts allow-downloads; frame-ancestors 'none'"
-"""Policy of a replay, besides that in its file: it is of no origin, so that no script that somebody
-puts into the file can lead a run."""
+POLICY_OF_FILES = "sandbox allow-scripts allow-downloads; frame-ancestors 'none'"
+"""Policy of replay and report, besides that in the file: it is of no origin, so that no script that
+somebody puts into the file can lead a run."""
 
 
 class Site:
@@ -39,8 +39,8 @@ class Site:
 
     def __init__(self, settings: ViewerSettings, pass_on: Callable[[Command], None]) -> None:
         self._token: str | None = None
-        self.replay: Path | None = None
-        """The replay of the run, once that has ended."""
+        self.files: dict[str, Path] = {}
+        """The replay and the report of the run, once that has ended."""
         self.leading: Leadership | None = None
         """Which page controls the run; None: none does."""
         if settings.has_controls:
@@ -50,7 +50,7 @@ class Site:
 
     def begin(self, settings: ViewerSettings) -> None:
         """Serve the page of a run."""
-        self.replay = None
+        self.files = {}
         how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
         self.document = live_page(
             settings.title,
@@ -90,19 +90,24 @@ class PageRequest(SiteRequest):
         self.write(self._site.document)
 
 
-class ReplayRequest(SiteRequest):
-    """A browser's request for the replay: for who has the token of the page, and no other file."""
+class FileRequest(SiteRequest):
+    """A browser's request for replay or report: for who has the token of the page."""
 
-    def get(self) -> None:
-        """Send the file."""
+    def get(self, name: str) -> None:
+        """Send the file.
+
+        Args:
+            name: Which of them.
+        """
         if not self._site.knows(self.get_argument("token", "")):
             raise tornado.web.HTTPError(403)
         try:
-            content = b"" if self._site.replay is None else self._site.replay.read_bytes()
+            path = self._site.files.get(name)
+            content = b"" if path is None else path.read_bytes()
         except OSError:  # it was moved since
             content = b""
         if not content:
             raise tornado.web.HTTPError(404)
         self.set_header("Content-Type", "text/html; charset=utf-8")
-        self.set_header("Content-Security-Policy", POLICY_OF_REPLAY)
+        self.set_header("Content-Security-Policy", POLICY_OF_FILES)
         self.write(content)

@@ -11,14 +11,15 @@ class Results {
         // On a small screen it would hide the tissue.
         element("results").open = !window.matchMedia("(max-width: 640px), (max-height: 480px)").matches;
         element("open-replay").href = element("save-replay").href = address;
+        element("open-report").href = element("save-report").href = `/report${run.query}`;
     }
 
-    // `results` is a `RunResults`: figures, folder, path of the replay; null while the run goes on.
+    // `results` is a `RunResults`: figures, folder, paths of replay and report; null while the run goes on.
     show(results) {
         element("results").hidden = results === null;
         for (const button of element("try-next").querySelectorAll("button")) button.disabled = !this.run.leads;
         if (results === null || this.shown !== null) return;
-        const [figures, folder, replay] = this.shown = results;
+        const [figures, folder, replay, report] = this.shown = results;
         element("figures").replaceChildren(...figures.flatMap(([label, figure]) => {
             const [term, value] = [document.createElement("dt"), document.createElement("dd")];
             term.textContent = label;
@@ -28,6 +29,8 @@ class Results {
         element("folder").textContent = folder;
         element("replays").hidden = replay === "";
         element("save-replay").download = pictureName().replace(/-[\d.]+s\.png$|\.png$/, "-replay.html");
+        element("reports").hidden = report === "";
+        element("save-report").download = element("save-replay").download.replace(/replay\.html$/, "report.html");
         this.offerNext();
     }
 

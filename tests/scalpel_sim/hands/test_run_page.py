@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.runs.file_names import REPLAY, SUMMARY
+from scalpel_sim.runs.file_names import REPLAY, REPORT, SUMMARY
 from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView
 from tests.scalpel_sim.hands.test_driven_page import drag, tip, until_it_rests
 from tests.support.browser import new_tab
@@ -94,6 +94,11 @@ def test_a_run_that_has_ended_shows_its_results_gives_its_replay_and_is_done_aga
             tab.click("#save-replay")
         assert download.value.suggested_filename == "grid2-straight-stroke-replay.html"
         assert Path(download.value.path()).read_bytes() == (view.folder / REPLAY).read_bytes()
+        with tab.expect_download() as download:
+            tab.click("#save-report")
+        assert download.value.suggested_filename == "grid2-straight-stroke-report.html"
+        assert Path(download.value.path()).read_bytes() == (view.folder / REPORT).read_bytes()
+        assert tab.evaluate("fetch('/report?token=no').then((answer) => answer.status)") == 403
         with tab.expect_popup() as opened:
             tab.click("#open-replay")
         opened.value.wait_for_function("typeof player !== 'undefined' && player.shown >= 0")
