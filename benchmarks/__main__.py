@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from benchmarks.costs import checked_steps, images, saved_state, surface_values, undo
+from benchmarks.costs import checked_steps, images, saved_state, score, surface_values, undo
 from benchmarks.device_link import device_link
 from benchmarks.frame import fixed_cost, frame
 from benchmarks.links import lag, round_trip
@@ -50,6 +50,7 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "fixed-cost": fixed_cost,
     "checked-steps": checked_steps,
     "saved-state": saved_state,
+    "score": score,
     "surface-values": surface_values,
     "images": images,
     "undo": undo,

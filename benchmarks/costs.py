@@ -2,13 +2,14 @@
 
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, get_args
 
 import numpy as np
+from msgspec import structs
 
 from benchmarks.frame import Stopwatches
 from benchmarks.timing import Rounds, TurnWatch, time_calls
@@ -22,6 +23,7 @@ from scalpel_sim.runs.options import Flag
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.scene.read import scene_called
 from scalpel_sim.scene.scene import changed
+from scalpel_sim.scene.task_table import LimitTable, TaskTable
 from scalpel_sim.simulation import no_garbage_collection
 from scalpel_sim.validate.speed.measurements import CPU, LOWER, WALL, BenchmarkResult
 from scalpel_sim.validate.speed.tables import Rows
@@ -39,6 +41,15 @@ _IMAGES_FROM, _IMAGES_TO = 0.4, 1.2
 """Time in which images are taken [s]: as the organ is cut."""
 
 _OF_IMAGES = ("20 ms of simulation", "image", "a further camera", "depth", "all three")
+
+_TASK = TaskTable(limits=(LimitTable(strain=0.5),))
+"""Task of a scene without one: its plan is that of the strokes, and strain counts everywhere."""
+
+_ABOUT_SCORE = (
+    "CPU time of Score.after_frame over that of Simulation.step, in the second of two whole runs; "
+    "a control step is 20 frames. Plan, forces, strain everywhere, and pieces are in it. The "
+    "stopwatches cost some 2 us a frame, of which half is counted."
+)
 
 _DRAWN = 0.035
 """Distance by which a hand draws the blade in each stroke [m]."""
@@ -253,3 +264,37 @@ def _tissue_of(simulation: Simulation) -> Tissue:
     """Return the tissue of a simulation, which is in this process."""
     assert isinstance(simulation.link, InProcessLink)
     return simulation.link.tissue
+
+
+def score(scenes: Sequence[str] = ("slab", "organ", "incision", "tumour"), /) -> BenchmarkResult:
+    """Measure the share of the CPU time of a run that its score takes.
+
+    Args:
+        scenes: Scenes; one without a task gets one.
+    """
+    rows = Rows("score", CPU)
+    for name in scenes:
+        scene = scene_called(name)
+        task = structs.replace(scene.task or _TASK, limits=_TASK.limits)
+        simulation = prepare(structs.replace(scene, task=task), records=False)
+        simulation.run(simulation.duration)  # loads and compiles
+        simulation.reset()
+        watches = Stopwatches(time.thread_time_ns)
+        detach = watches.attach(
+            (
+                "scalpel_sim.simulation:Simulation.step",
+                "scalpel_sim.scoring.score:Score.after_frame",
+            )
+        )
+        try:
+            simulation.run(simulation.duration)
+        finally:
+            detach()
+        own, rest = (watches.spent[each] for each in ("Score.after_frame", "Simulation.step"))
+        size, n = simulation.link.describe().n_tetrahedra, simulation.n_frames
+        share, each = 100.0 * own / (own + rest), 1e-6 * own / n * 20
+        for case, figure, unit in (("share", share, "%"), ("a control step", each, "ms")):
+            rows.values(
+                f"{name}: {case}", size, [figure], unit, quantity=case, better=LOWER, clock=CPU.name
+            )
+    return rows.table("score", _ABOUT_SCORE)

@@ -4,6 +4,7 @@ import gc
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -38,6 +39,25 @@ EveryFrame = Callable[["Simulation"], bool | None]
 
 DrawFrame = Callable[["Simulation"], None]
 """Called after each frame, timed as the stage RD: a replay or a live viewer draws it."""
+
+
+class Scorer(Protocol):
+    """Scores a simulation against its task: see `scoring.score.Score`."""
+
+    def after_frame(self, simulation: "Simulation") -> None:
+        """Count the last frame."""
+
+    def look(self, simulation: "Simulation") -> None:
+        """Look at the tissue now."""
+
+    def terms(self) -> dict[str, float]:
+        """Return the terms so far by name, in SI units."""
+
+    def failed(self) -> list[str] | None:
+        """Return the conditions of success that do not hold; None where there are none."""
+
+    def figures(self) -> dict[str, Any]:
+        """Return the terms so far, for `summary.json`."""
 
 
 class Simulation:
@@ -112,6 +132,8 @@ class Simulation:
         """Scene that it was made from; None: it was made without one."""
         self.expected_force: float | None = None
         """Force of the cut if the body does not give way [N]; None where that is not known."""
+        self.score: Scorer | None = None
+        """The score so far, of a scene with a task."""
         self.pictures: list[DrawFrame] = []
         """Called after each frame; most frames they skip."""
         self.wall_seconds = 0.0
@@ -212,6 +234,8 @@ class Simulation:
             draw(self)
         drawn = time.perf_counter()
         self.n_frames += 1
+        if self.score is not None:
+            self.score.after_frame(self)
         if self.records:
             result, stages = self.bridge.result, _NO_STEP
             if result is not None and self.bridge.answered:

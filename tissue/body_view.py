@@ -11,7 +11,7 @@ from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.elasticity.internal_forces import Elastic
 from tissue.fields.node_fields import largest_principal_strains, von_mises_stresses
 from tissue.fields.tetrahedron_fields import (
-    principal_strains,
+    mark_strained,
     strains_of_tetrahedra,
     stresses_of_tetrahedra,
 )
@@ -238,15 +238,16 @@ class BodyView:
         """Return where material points are now [m], shape (n, 3)."""
         return points.positions(self._body)
 
-    def strains_of(self, points: MaterialPoints) -> FloatArray:
-        """Return the largest principal Green-Lagrange strain at material points, shape (n,).
+    def mark_strained(self, points: MaterialPoints, limit: float, marked: BoolArray) -> None:
+        """Mark the material points at which the tissue is now stretched beyond a limit.
 
-        (l^2 - 1) / 2 where the most stretched direction is l times as long, in the tetrahedron that
-        holds the point now.
+        Args:
+            points: The points.
+            limit: Largest principal Green-Lagrange strain, above 0: (l^2 - 1) / 2 where the most
+                stretched direction is l times as long, in the tetrahedron that holds the point.
+            marked: Which are marked, shape (n,); those are not looked at again.
         """
-        tetrahedra, strains = points.holders(self._body), np.empty(len(points))
-        principal_strains(self._body, tetrahedra, strains)
-        return strains
+        mark_strained(self._body, points.holders(self._body), float(limit), marked)
 
     @property
     def n_cut_faces(self) -> int:

@@ -10,6 +10,7 @@ from .core.kernel_folder import cache_directory as cache_directory
 from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
+from .geometry.near_triangles import mark_near_triangles as mark_near_triangles
 from .io.mesh_io import read_mesh_file as read_mesh_file
 from .io.mesh_io import stand_in as stand_in
 from .io.mesh_report import likely_unit as likely_unit
@@ -38,6 +39,7 @@ __all__ = [
     "is_compiling",
     "likely_unit",
     "kernel",
+    "mark_near_triangles",
     "n_compiled_kernels",
     "new_whole_file",
     "quality",

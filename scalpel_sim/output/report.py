@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.output.run_outcome import COMPLETE
+from scalpel_sim.output.score_table import score_table
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.recording import TERMS
 from tissue import LAWS
@@ -73,6 +74,8 @@ def print_summary(summary: Summary, console: Console) -> None:
         console.print(_labels(summary))
     if summary.interfaces:
         console.print(_interfaces(summary))
+    if summary.score is not None:
+        console.print(score_table(summary.score))
     if summary.warnings:
         warnings = Table(title="warnings", title_justify="left", show_header=False, show_lines=True)
         warnings.add_column(style="bold", no_wrap=True)

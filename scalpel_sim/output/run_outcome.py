@@ -78,6 +78,8 @@ class RunOutcome:
     """Number of points that each attachment holds at the end."""
     label_names: Mapping[int, str] = field(default_factory=dict)
     """Names of the labels of the body, as far as they are known."""
+    score: dict[str, Any] | None = None
+    """Figures of the score; None of a run without a task."""
 
     @cached_property
     def pieces(self) -> tuple[Piece, ...] | None:
@@ -319,7 +321,9 @@ def outcome_of(
         report: Report on the cut at the end; None where the link to the tissue was lost.
         status: `complete`, or what ended the run before its time.
     """
-    bridge, stroke = simulation.bridge, simulation.stroke
+    bridge, stroke, score = simulation.bridge, simulation.stroke, simulation.score
+    if score is not None:
+        score.look(simulation)
     return RunOutcome(
         recording=simulation.recording,
         dt=simulation.dt,
@@ -341,6 +345,7 @@ def outcome_of(
         stroke_ends=() if simulation.blade.progress is None else simulation.blade.progress.ends,
         held_points=[load.n_points for load in bridge.frame_loads],
         label_names=simulation.link.label_names,
+        score=None if score is None else score.figures(),
     )
 
 

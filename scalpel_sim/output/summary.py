@@ -91,6 +91,8 @@ class Summary(NamedTuple):
     interfaces: list[dict[str, Any]]
     """Of each layer between two parts: `between`, `toughness_j_m2`, `area_m2` at rest, and
     `cut_area_m2`, how much of it is open."""
+    score: dict[str, Any] | None
+    """The score against the task (`scoring.score.Score.figures`); None of a run without one."""
     cores: list[dict[str, Any]]
     """Of each rigid core: how far it has moved and turned from the first frame to the last."""
     attachments: list[dict[str, Any]]
@@ -151,6 +153,7 @@ def summarise(outcome: RunOutcome, warnings: Iterable[RunWarning] = ()) -> Summa
         strokes=_strokes(outcome),
         labels=label_figures(outcome),
         interfaces=interface_figures(outcome),
+        score=outcome.score,
         cores=_cores(outcome),
         attachments=_attachments(outcome),
         work_of_blade_j=work,

@@ -22,6 +22,8 @@ from scalpel_sim.instruments.scene_graspers import grip_settings, motions_of
 from scalpel_sim.preparation.tissue import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene.arm_tables import GrasperTable
 from scalpel_sim.scene.scene import Scene
+from scalpel_sim.scoring.score import Score
+from scalpel_sim.scoring.yardstick import yardstick_of
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.grasp_motion import GraspMotion
@@ -74,6 +76,7 @@ def prepare(
     if not stroke.is_led:
         check_meets(stroke, mesh)
     motions = motions_of(scene.graspers)
+    planned = stroke
     if is_led:
         stroke, motions = resting_stroke(stroke.pose(0.0)), [each.at_rest() for each in motions]
     needed = _needed(stroke, mesh, scene)
@@ -110,6 +113,9 @@ def prepare(
     simulation.expected_force = needed.force
     if scene.graspers:
         _add_graspers(simulation, scene.graspers, motions)
+    if scene.task is not None:
+        yardstick = yardstick_of(scene.task, planned, body, link.label_names)
+        simulation.score = Score(yardstick, simulation, body)
     if isinstance(link, InProcessLink):
         simulation.note_start()
     return simulation

@@ -12,8 +12,10 @@ SCENE = "scene.toml"
 STROKE = "stroke.csv"
 """Motion of the blade in a hand. A scripted run leaves it, and the files of graspers: they may be
 the very ones that are done again."""
+PLAN = "plan.npz"
+"""Plan by which a run that a hand led is scored: that of the strokes which the hand replaced."""
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY, REPORT)
-"""Names of all files that a run can write, besides `STROKE`."""
+"""Names of all files that a run can write, besides `STROKE` and `PLAN`."""
 
 REPLAY_FRAMES = "replay.part"
 """The frames of the replay, while the run continues."""

@@ -4,28 +4,32 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 
-from msgspec import structs
-
 from bridge import InProcessLink, LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.output.run_outcome import COMPLETE
 from scalpel_sim.output.summary import Summary
-from scalpel_sim.recording.growing_file import FileSum, sum_of
 from scalpel_sim.runs.checkpoints import Checkpoint, Checkpoints, RunMark, RunPlan
 from scalpel_sim.runs.console import progress
-from scalpel_sim.runs.file_names import FORCES, INITIAL, REPLAY_FRAMES, SCENE, STROKE, grasp_file
+from scalpel_sim.runs.file_names import (
+    FORCES,
+    INITIAL,
+    REPLAY_FRAMES,
+    SCENE,
+    STROKE,
+    grasp_file,
+)
 from scalpel_sim.runs.prepared_run import PreparedRun
+from scalpel_sim.runs.repeated_scene import repeated_scene, sums_of_recorded
 from scalpel_sim.runs.resumption import RepeatedFrames, Resumption
 from scalpel_sim.runs.run_end import OpenRun, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.scene import Scene
-from scalpel_sim.scene.write import relative_path, scene_text
+from scalpel_sim.scene.write import scene_text
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.viewer.looks import look_of_scene
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
@@ -230,12 +234,12 @@ def _begin(run: OpenRun, scene: Scene | None, seconds: float | None) -> RunPlan:
         outputs.keep_reserve()
         outputs.remove_earlier_files()
     if scene is not None and hand is not None:
-        scene = _repeated(scene, outputs)
+        scene = repeated_scene(scene, simulation, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
     exports = [str(path.absolute()) for path in run.prepared.exports]
-    read = {} if scene is None or hand is not None else _sums_of_recorded(scene, outputs)
+    read = {} if scene is None or hand is not None else sums_of_recorded(scene, outputs)
     record = run.prepared.record
     path = None if record is None else str(record.absolute())
     plan = RunPlan(simulation.dt, text, exports, run.settings, seconds, path, read)
@@ -343,27 +347,6 @@ def _write_initial(run: OpenRun) -> None:
     """Write the body as it was at first."""
     names = run.simulation.link.label_names
     run.outputs.write_mesh(INITIAL, run.first, run.first_deformation, names)
-
-
-def _repeated(scene: Scene, outputs: Outputs) -> Scene:
-    """Return the scene that repeats what a hand will have done."""
-    recorded = StrokeTable(kind="recorded", file=str(outputs.path(STROKE)))
-    graspers = [
-        structs.replace(each, motion=[], recorded=str(outputs.path(grasp_file(each.name))))
-        for each in scene.graspers
-    ]
-    return structs.replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
-
-
-def _sums_of_recorded(scene: Scene, outputs: Outputs) -> dict[str, FileSum]:
-    """Return the checksums of the motions that a run repeats, by path seen from its folder.
-
-    No state knows them: that of a run that a hand led is of a stroke which is not recorded yet.
-
-    Raises:
-        OSError: one cannot be read.
-    """
-    return {relative_path(path, outputs.folder): sum_of(path) for path in scene.recorded_files}
 
 
 def _length_of(

@@ -24,6 +24,7 @@ from scalpel_sim.runs.file_names import (
     INITIAL,
     JOURNAL,
     PASSING_FILES,
+    PLAN,
     PLOT,
     REPLAY,
     REPLAY_FRAMES,
@@ -33,6 +34,7 @@ from scalpel_sim.runs.file_names import (
     SUMMARY,
 )
 from scalpel_sim.runs.resumption import Resumption
+from scalpel_sim.scoring.plan import Plan
 from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import Deformation, Snapshot, write_vtu
@@ -147,6 +149,10 @@ class Outputs:
     def write_scene(self, text: str) -> None:
         """Write `scene.toml`."""
         self._write_whole(SCENE, lambda path: path.write_text(text, encoding="utf-8"))
+
+    def write_plan(self, plan: Plan) -> None:
+        """Write the plan by which a run is scored."""
+        self._write_whole(PLAN, plan.write)
 
     def write_mesh(
         self,

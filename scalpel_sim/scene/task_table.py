@@ -100,7 +100,8 @@ class TaskTable(TomlTable, kw_only=True, frozen=True):
     """Line of the cut on the skin [m]: points [x, y], or [x, y, z] near it, which are moved onto
     the skin along the depth. Without line and surface the plan is what the strokes are to cut."""
     surface: FileName | None = None
-    """STL file of the surface of the cut, in the body at rest, in place of a line [m]."""
+    """STL file of the surface of the cut, in the body at rest, in place of a line [m]; or the
+    `plan.npz` of a run that a hand led."""
     depth: Positive | None = None
     """Depth of the cut below a line [m]."""
     into: ThreeNumbers | None = None

@@ -6,6 +6,7 @@ is what the edge passes on its way forward if the body does not give way.
 
 import itertools
 import math
+import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,9 @@ from scalpel_sim.strokes.asked import PassedPlaces, tetrahedra_at
 from scalpel_sim.strokes.skin import BodySkin
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, IntArray, Snapshot, TetrahedralMesh
+
+PLAN_SUFFIX = ".npz"
+"""Suffix of a file of a plan."""
 
 STATION = 1e-3
 """Distance between two stations along a line, at which depths are compared [m]."""
@@ -49,24 +53,52 @@ class Plan(NamedTuple):
         """Area of the surface [m2]."""
         return float(self.surface.areas.sum())
 
-    def station_of(self, points: FloatArray, aside: float) -> tuple[IntArray, FloatArray]:
-        """Return the station that points are below, or -1, and how deep they are [m].
+    def write(self, path: Path) -> None:
+        """Write the plan as a NumPy archive, which `surface` of a task may name.
+
+        Raises:
+            OSError: the system refuses.
+        """
+        with path.open("wb") as file:
+            np.savez(file, allow_pickle=False, **self.surface._asdict(), **self._asdict_of_line())
+
+    def _asdict_of_line(self) -> dict[str, FloatArray]:
+        """Return the arrays besides those of the surface, by name."""
+        return {name: array for name, array in self._asdict().items() if name != "surface"}
+
+
+class StationSearch:
+    """Finds the station that a place is below.
+
+    Args:
+        stations: Places on the skin [m], shape (k, 3), one at least.
+        into: Unit vector in which depth is measured.
+        aside: Distance from the line, seen along the depth, up to which a place counts [m].
+    """
+
+    def __init__(self, stations: FloatArray, into: FloatArray, aside: float) -> None:
+        from scipy.spatial import cKDTree  # 0.2 s, and only here
+
+        self._stations, self._into = stations, into
+        self._reach = math.hypot(aside, 0.5 * STATION)
+        self._tree = cKDTree(_seen_along(stations, into))
+
+    def deepest(self, points: FloatArray) -> FloatArray:
+        """Return how deep the deepest of some places is below each station [m], shape (k,).
+
+        Minus infinity where there is none.
 
         Args:
             points: In the body at rest [m], shape (n, 3).
-            aside: Distance from the line, seen along the depth, up to which a point counts [m].
         """
-        if len(self.stations) == 0 or len(points) == 0:
-            return np.full(len(points), -1), np.zeros(len(points))
-        from scipy.spatial import cKDTree  # 0.2 s, and only here
-
-        flat = cKDTree(_seen_along(self.stations, self.into))
-        reach = math.hypot(aside, 0.5 * STATION)
-        distances, found = flat.query(_seen_along(points, self.into), distance_upper_bound=reach)
+        depths = np.full(len(self._stations), -np.inf)
+        seen = _seen_along(points, self._into)
+        distances, found = self._tree.query(seen, distance_upper_bound=self._reach)
         is_below = np.isfinite(distances)
-        station = np.where(is_below, found, -1)
-        deep = (points - self.stations[np.where(is_below, found, 0)]) @ self.into
-        return station, np.where(is_below, deep, 0.0)
+        station = found[is_below]
+        deep = (points[is_below] - self._stations[station]) @ self._into
+        np.maximum.at(depths, station, deep)
+        return depths
 
 
 def plan_of(task: TaskTable, stroke: Stroke, body: Snapshot) -> Plan | None:
@@ -83,10 +115,25 @@ def plan_of(task: TaskTable, stroke: Stroke, body: Snapshot) -> Plan | None:
     if task.line is not None:
         return _plan_of_line(task, body)
     if task.surface is not None:
-        return _plan_of_surface(task, body)
+        path = Path(task.surface)
+        return _read(path) if path.suffix == PLAN_SUFFIX else _plan_of_surface(task, path, body)
     if stroke.asked is None:
         return None
     return _plan_of_stroke(task, stroke, body)
+
+
+def _read(path: Path) -> Plan:
+    """Return a plan that `Plan.write` has written.
+
+    Raises:
+        UsageError: there is no such file, or it holds no plan.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            surface = SampledSurface(*(file[name] for name in SampledSurface._fields))
+            return Plan(surface, *(file[name] for name in Plan._fields[1:]))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise UsageError(f"[task] surface: {path} holds no plan of a run ({error})") from error
 
 
 def _plan_of_line(task: TaskTable, body: Snapshot) -> Plan:
@@ -125,12 +172,10 @@ def _on_skin(place: FloatArray, skin: BodySkin, into: FloatArray) -> FloatArray:
     return skin.rest_place(found)
 
 
-def _plan_of_surface(task: TaskTable, body: Snapshot) -> Plan:
+def _plan_of_surface(task: TaskTable, path: Path, body: Snapshot) -> Plan:
     """Return the surface of an STL file, as far as it is in the body."""
-    assert task.surface is not None
     import trimesh  # 0.3 s, and only here
 
-    path = Path(task.surface)
     try:
         mesh = trimesh.load_mesh(path)
         corners = np.asarray(mesh.triangles, float)
@@ -229,12 +274,13 @@ def _plan(surface: SampledSurface, line: FloatArray, into: FloatArray, body: Sna
     kept = SampledSurface(*(each[holder >= 0] for each in surface))
     if len(kept.points) == 0:
         raise UsageError("[task]: nothing of the planned surface is in the body")
-    plan = Plan(kept, into, line, _stations(line, into), np.zeros(0))
-    below, deep = plan.station_of(kept.points, PLAN_SPACING)
-    depths = np.full(len(plan.stations), -np.inf)
-    np.maximum.at(depths, below[below >= 0], deep[below >= 0] + 0.5 * PLAN_SPACING)
-    is_planned = depths > PLAN_SPACING
-    return plan._replace(stations=plan.stations[is_planned], depths=depths[is_planned])
+    stations, depths = _stations(line, into), np.zeros(0)
+    if len(stations):
+        search = StationSearch(stations, into, PLAN_SPACING)
+        depths = search.deepest(kept.points) + 0.5 * PLAN_SPACING
+        is_planned = depths > PLAN_SPACING
+        stations, depths = stations[is_planned], depths[is_planned]
+    return Plan(kept, into, line, stations, depths)
 
 
 def _stations(line: FloatArray, into: FloatArray) -> FloatArray:

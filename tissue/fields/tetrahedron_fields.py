@@ -17,7 +17,7 @@ share of its pull; so the virials of all tetrahedra are those of all springs. Vi
 in it, nor is what keeps tetrahedra of springs from turning inside out.
 """
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, norm, sub, vec3
 from tissue.elasticity.finite_elements import corner_row
@@ -45,17 +45,24 @@ def strains_of_tetrahedra(body: Body, strains: FloatArray) -> None:
 
 
 @kernel
-def principal_strains(body: Body, tetrahedra: IntArray, strains: FloatArray) -> None:
-    """Write the largest principal Green-Lagrange strain of some tetrahedra.
+def mark_strained(body: Body, tetrahedra: IntArray, limit: float, marked: BoolArray) -> None:
+    """Mark where the largest principal strain is above a limit.
 
     Args:
         body: The body.
-        tetrahedra: Which, shape (n,).
-        strains: Written, shape (n,).
+        tetrahedra: Some of its tetrahedra, shape (n,).
+        limit: The limit, above 0.
+        marked: Those that are marked already are not looked at, shape (n,).
     """
     for i in range(len(tetrahedra)):
-        strain, _ = green_lagrange(body, tetrahedra[i])
-        strains[i] = largest_eigenvalue(strain)
+        if marked[i]:
+            continue
+        e, _ = green_lagrange(body, tetrahedra[i])
+        square = e.xx * e.xx + e.yy * e.yy + e.zz * e.zz
+        square += 2.0 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)
+        # It is the sum of the squares of all principal strains.
+        if square > limit * limit and largest_eigenvalue(e) > limit:
+            marked[i] = True
 
 
 @kernel

@@ -77,16 +77,21 @@ def locate_points(body: Body, rest: FloatArray, tetrahedra: IntArray, weights: F
     """
     for k in range(len(tetrahedra)):
         p, held = vec3(rest, k), tetrahedra[k]
-        if held < 0 or _depth(body, rest, k, held) < -INSIDE_TOLERANCE:
-            deepest = -np.inf
-            # What a cut makes of a tetrahedron keeps its label, and bodies touch at rest.
-            label = body.materials.label[body.material[held]] if held >= 0 else -1
-            for t in range(body.n_tetrahedra):
-                if label >= 0 and body.materials.label[body.material[t]] != label:
-                    continue
-                depth = _depth(body, rest, k, t)
-                if depth > deepest:
-                    deepest, held = depth, t
+        if held >= 0:
+            w = barycentric_in(p, body.rest, body.tetrahedra, held)
+            if smallest_weight(w) >= -INSIDE_TOLERANCE:
+                for i in range(4):
+                    weights[k, i] = w[i]
+                continue
+        deepest = -np.inf
+        # What a cut makes of a tetrahedron keeps its label, and bodies touch at rest.
+        label = body.materials.label[body.material[held]] if held >= 0 else -1
+        for t in range(body.n_tetrahedra):
+            if label >= 0 and body.materials.label[body.material[t]] != label:
+                continue
+            depth = _depth(body, rest, k, t)
+            if depth > deepest:
+                deepest, held = depth, t
         tetrahedra[k] = held
         w = barycentric_in(p, body.rest, body.tetrahedra, held)
         for i in range(4):

@@ -42,7 +42,9 @@ class CutFaces(NamedTuple):
     times: FloatArray
     """Ends of the steps in which they were opened [s], since the body was made, shape (n,)."""
 
-    def __len__(self) -> int:
+    @property
+    def n(self) -> int:
+        """Number of faces."""
         return len(self.areas)
 
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from tests.support import bodies, strokes
 from tissue import BladeShape, Material, SolverSettings, Tissue, TissueState, block
 from tissue.blade.prescribed_cut import cut_along
+from tissue.support import mark_near_triangles
 
 ROUNDING = 1e-9
 """Relative difference of two sums of the same areas."""
@@ -118,11 +120,11 @@ def test_a_state_has_the_faces(as_bytes):
     for sweep in sweeps[:150]:
         tissue.step(sweep, strokes.DT)
     state, then = tissue.save_state(), tissue.cut_faces()
-    assert len(then) > 0
+    assert then.n > 0
     for sweep in sweeps[150:]:
         tissue.step(sweep, strokes.DT)
     whole = tissue.cut_faces()
-    assert len(whole) > len(then)
+    assert whole.n > then.n
     if as_bytes:
         tissue, state = held(mesh), TissueState.from_bytes(state.to_bytes())
     tissue.load_state(state)
@@ -134,10 +136,37 @@ def test_a_state_has_the_faces(as_bytes):
         np.testing.assert_array_equal(found, expected)
 
 
-def test_strains_of_material_points_are_those_of_their_tetrahedra():
-    mesh = bodies.jittered(3, 0)
-    stretched = mesh.positions * (1.0, 1.2, 1.0)
-    tissue = Tissue(mesh, Material(), positions=stretched, gravity=(0.0, 0.0, 0.0))
+def test_material_points_are_marked_where_the_tissue_is_stretched_too_far():
+    """One half is stretched by 20 %: a strain of 0.22; the other turns, which is none."""
+    mesh = block((2, 2, 2), (0.04, 0.04, 0.04))
+    positions = mesh.positions.copy()
+    positions[:, 1] *= np.where(mesh.positions[:, 0] > 0.03, 1.2, 1.0)
+    tissue = Tissue(mesh, Material(), positions=positions, gravity=(0.0, 0.0, 0.0))
     middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
-    strains = tissue.strains_of(tissue.material_points(middles))
-    np.testing.assert_allclose(strains, 0.5 * (1.2**2 - 1.0), rtol=1e-9)
+    points, largest = tissue.material_points(middles), tissue.deformation().strain
+    largest = np.linalg.eigvalsh(largest).max(axis=1)
+    for limit in (0.01, 0.1, 0.3):
+        marked = np.zeros(len(middles), bool)
+        tissue.mark_strained(points, limit, marked)
+        np.testing.assert_array_equal(marked, largest > limit)
+
+
+def test_a_point_that_was_marked_stays_so():
+    tissue = held(block((1, 1, 1), (0.04, 0.04, 0.04)))
+    points = tissue.material_points([[0.01, 0.02, 0.02], [0.03, 0.02, 0.02]])
+    marked = np.array([True, False])
+    tissue.mark_strained(points, 0.1, marked)
+    assert marked.tolist() == [True, False]
+
+
+def test_points_near_a_triangle_are_marked():
+    """Against the nearest of 200,000 places on the triangle."""
+    random = np.random.default_rng(3)
+    points, corners = random.uniform(-0.3, 1.3, (300, 3)), random.uniform(0.0, 1.0, (3, 3))
+    shares = random.dirichlet(np.ones(3), 200_000)
+    distances, _ = cKDTree(shares @ corners).query(points)
+    clear = np.abs(distances - 0.5) > 0.01
+    marked = np.zeros(len(points), bool)
+    mark_near_triangles(points, corners, 0.5, marked)
+    np.testing.assert_array_equal(marked[clear], distances[clear] < 0.5)
+    assert 30 < marked.sum() < 270

@@ -1,0 +1,126 @@
+"""Terms of the faces that a cut has opened, in the body at rest: nothing of them counts twice."""
+
+import numpy as np
+
+from scalpel_sim.scoring.plan import STATION
+from scalpel_sim.scoring.sampled_surface import (
+    SurfaceSearch,
+    parts_of_triangles,
+    places_on_edges,
+)
+from scalpel_sim.scoring.yardstick import Yardstick
+from tissue import BoolArray, CutFaces, FloatArray
+from tissue.support import mark_near_triangles
+
+FACE_SPACING = 2e-3
+"""Longest side of the parts of a face whose middles are compared with the plan [m]."""
+
+EDGE_SPACING = 0.5 * STATION
+"""Distance between places on the edges of a face, by which depths are found [m]."""
+
+N_CAUSES = 3
+"""Causes of a cut face: see `tissue.CutFaces`."""
+
+
+class CutTerms:
+    """Cuts along the plan, and beside it, so far.
+
+    Args:
+        yardstick: The plan, and parts to be spared.
+    """
+
+    def __init__(self, yardstick: Yardstick) -> None:
+        self._yardstick = yardstick
+        plan = yardstick.plan
+        self._is_covered = np.zeros(0 if plan is None else len(plan.surface.points), bool)
+        self._reached = np.zeros(0 if plan is None else len(plan.stations))
+        self._squares = 0.0
+        self.area = 0.0
+        """Area of all cuts [m2]."""
+        self.off_plan = 0.0
+        """Area farther than the tolerance from the plan [m2]."""
+        self.largest_error = 0.0
+        """Greatest distance of a cut from the plan [m]."""
+        self.area_of_cause = np.zeros(N_CAUSES)
+        """Area by cause [m2]: blade, finished bridges, given."""
+        self.spared_area = np.zeros(len(yardstick.spared))
+        """Area cut within each part that is to be spared [m2]."""
+        self.spared_distance = np.full(len(yardstick.spared), np.inf)
+        """Nearest distance of a cut from each of them [m]."""
+
+    def take(self, faces: CutFaces) -> None:
+        """Count new faces."""
+        if faces.n == 0:
+            return
+        self.area += float(faces.areas.sum())
+        self.area_of_cause += np.bincount(faces.causes, faces.areas, N_CAUSES)
+        self._compare(faces.corners)
+        for i, part in enumerate(self._yardstick.spared):
+            is_within = (faces.labels == part.label).all(axis=1)
+            self.spared_area[i] += float(faces.areas[is_within].sum())
+            nearest = 0.0
+            if not is_within.any():
+                nearest = _distance(part.search, faces.corners)
+            self.spared_distance[i] = min(float(self.spared_distance[i]), nearest)
+
+    def _compare(self, corners: FloatArray) -> None:
+        """Compare faces with the plan; their corners [m] have shape (n, 3, 3)."""
+        plan, search = self._yardstick.plan, self._yardstick.plan_search
+        if plan is None or search is None:
+            return
+        tolerance, stations = self._yardstick.task.tolerance, self._yardstick.station_search
+        parts = parts_of_triangles(corners, FACE_SPACING)
+        distances = search.distances(parts.middles)
+        self.off_plan += float(parts.areas[distances > tolerance].sum())
+        self._squares += float(parts.areas @ distances**2)
+        in_rows = corners.reshape(-1, 3)
+        self.largest_error = max(self.largest_error, float(search.distances(in_rows).max()))
+        mark_near_triangles(plan.surface.points, in_rows, tolerance, self._is_covered)
+        if stations is not None:
+            deepest = stations.deepest(places_on_edges(corners, EDGE_SPACING))
+            np.maximum(self._reached, deepest, out=self._reached)
+
+    @property
+    def is_covered(self) -> BoolArray:
+        """Which places of the plan have a cut within the tolerance, shape (n,). A copy."""
+        return self._is_covered.copy()
+
+    @property
+    def covered(self) -> float | None:
+        """Share of the plan with a cut within the tolerance; None without a plan."""
+        plan = self._yardstick.plan
+        if plan is None:
+            return None
+        return float(plan.surface.areas[self._is_covered].sum() / plan.area)
+
+    @property
+    def path_error(self) -> float:
+        """Root mean square of the distance of the cut from the plan [m]; 0 without a cut."""
+        return float((self._squares / self.area) ** 0.5) if self.area > 0.0 else 0.0
+
+    @property
+    def depth_error(self) -> float | None:
+        """Mean error of depth [m]; None without stations."""
+        plan = self._yardstick.plan
+        if plan is None or len(plan.stations) == 0:
+            return None
+        return float(np.abs(self._reached - plan.depths).mean())
+
+    @property
+    def is_spared(self) -> bool:
+        """Whether all that is to be spared is whole, and no cut is within its margin."""
+        margins = np.array([part.margin for part in self._yardstick.spared])
+        is_whole = not self.spared_area.any()
+        return bool(is_whole and (self.spared_distance >= margins).all())
+
+
+def _distance(search: SurfaceSearch, corners: FloatArray) -> float:
+    """Return the nearest distance of faces from a surface [m].
+
+    Args:
+        search: The surface.
+        corners: Of the faces [m], shape (n, 3, 3).
+    """
+    middles = parts_of_triangles(corners, FACE_SPACING).middles
+    places = np.concatenate([places_on_edges(corners, EDGE_SPACING), middles])
+    return float(search.distances(places).min())

@@ -1,0 +1,237 @@
+"""`Score`: how well a task is done so far, whoever leads the instruments."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from bridge import InProcessLink
+from scalpel_sim.scene.task_table import SuccessTable
+from scalpel_sim.scoring.cut_terms import CutTerms
+from scalpel_sim.scoring.hand_terms import HandTerms
+from scalpel_sim.scoring.plan import Plan
+from scalpel_sim.scoring.tissue_terms import PiecesTerm, StrainTerm
+from scalpel_sim.scoring.yardstick import Yardstick
+from scalpel_sim.simulation import Simulation
+from tissue import BoolArray, Snapshot, Tissue
+
+CONTROL_STEP = 0.02
+"""Time from one look at the tissue to the next [s]: a control step of a hand or a policy."""
+
+BLADE_NAME = "blade"
+"""Name of the blade in a task."""
+
+_AT_LEAST = ("covered", "removed", "exposed")
+"""Terms of which success asks for that much; of others for no more."""
+
+
+class Score:
+    """The score of a simulation so far. It is a part of the simulation's state.
+
+    Forces count in each frame; all else at each control step.
+
+    Args:
+        yardstick: The plan and the limits.
+        simulation: Before its first frame, with all its instruments.
+        body: The body then.
+    """
+
+    def __init__(self, yardstick: Yardstick, simulation: Simulation, body: Snapshot) -> None:
+        self._yardstick = yardstick
+        self._every = max(round(CONTROL_STEP / simulation.dt), 1)
+        self._tissue = _tissue_of(simulation)
+        self._n_faces = 0 if self._tissue is None else self._tissue.n_cut_faces
+        limit = yardstick.force_limit
+        self._graspers = tuple(simulation.graspers)
+        names = [each.name for each in self._graspers]
+        self.hands = (
+            HandTerms(BLADE_NAME, limit(BLADE_NAME), can_hold=False),
+            *(HandTerms(name, limit(name), can_hold=True) for name in names),
+        )
+        """Terms of each instrument, the blade first."""
+        self.cut = CutTerms(yardstick)
+        """Terms of the cut."""
+        self._strains = tuple(StrainTerm(each) for each in yardstick.strains)
+        self._pieces = PiecesTerm(yardstick, body, simulation.link.n_pieces())
+        self._time = 0.0
+        self._work = (0.0, 0.0)
+        self._work_of_labels: tuple[float, ...] = ()
+        self._exposed: float | None = None
+        self.look_for_target: Callable[[], float] | None = None
+        """Returns the share of a camera's picture that shows the target; None: nobody looks."""
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan; None where there is none."""
+        return self._yardstick.plan
+
+    @property
+    def is_covered(self) -> BoolArray:
+        """Which places of the plan are cut, shape (n,). A copy."""
+        return self.cut.is_covered
+
+    def after_frame(self, simulation: Simulation) -> None:
+        """Count a frame, and where it ends a control step, that."""
+        dt, blade, graspers = simulation.dt, simulation.blade, self._graspers
+        self.hands[0].feel(blade.wrench, dt)
+        for terms, each in zip(self.hands[1:], graspers, strict=True):
+            terms.feel(each.wrench, dt)
+        if simulation.n_frames % self._every == 0:
+            dt *= self._every
+            self.hands[0].move(blade.segment.tip, False, dt)
+            for terms, each in zip(self.hands[1:], graspers, strict=True):
+                terms.move(each.grasper.pads.centre, each.n_points > 0, dt)
+            self.look(simulation)
+
+    def look(self, simulation: Simulation) -> None:
+        """Look at the tissue now; at each control step it is done anyway."""
+        self._time = simulation.time
+        result = simulation.bridge.result
+        if result is not None:
+            self._work = (result.work_of_blade, result.work_of_cutting)
+            self._work_of_labels = tuple(result.cutting_of_labels.tolist())
+        if self.look_for_target is not None:
+            self._exposed = self.look_for_target()
+        if self._tissue is None:
+            return
+        n = self._tissue.n_cut_faces
+        if n > self._n_faces:
+            self.cut.take(self._tissue.cut_faces(since=self._n_faces))
+            self._pieces.look(self._tissue)
+            self._n_faces = n
+        for strain in self._strains:
+            strain.look(self._tissue)
+
+    def terms(self) -> dict[str, float]:
+        """Return the terms as of the last control step, by name, in SI units.
+
+        Those that are not known are left out: without a plan, a target, limits of strain or a
+        camera; and those of the tissue where that is in another process.
+        """
+        task, hands = self._yardstick.task, self.hands
+        found: dict[str, float | None] = {}
+        if self._tissue is not None:
+            found |= _terms_of_cut(self.cut, self.plan)
+            if task.spare:
+                found |= {
+                    "spared": float(self.cut.is_spared),
+                    "spared_area": float(self.cut.spared_area.sum()),
+                }
+                if self.cut.area > 0.0:
+                    found["spared_distance"] = float(self.cut.spared_distance.min())
+            if self._strains:
+                found["strain_above"] = sum(each.volume for each in self._strains)
+            found["pieces"] = float(self._pieces.n)
+            if task.target is not None:
+                found |= {"removed": self._pieces.removed, "healthy": self._pieces.healthy}
+        found |= {
+            "force": max(each.force for each in hands),
+            "force_above": max(each.force_above for each in hands),
+            "impulse": sum(each.impulse for each in hands),
+            "path_length": sum(each.path_length for each in hands),
+            "jerk": max(each.jerk for each in hands),
+            "exposed": self._exposed,
+            "time": self._time,
+            "work": self._work[0],
+        }
+        for each in hands:
+            if each.can_hold:
+                found[f"{each.name}_held"] = each.held
+                found[f"{each.name}_dropped"] = float(each.dropped)
+        return {name: value for name, value in found.items() if value is not None}
+
+    def failed(self) -> list[str] | None:
+        """Return the conditions of success that do not hold now; None where there are none.
+
+        A term that is not known does not hold.
+        """
+        task, terms = self._yardstick.task, self.terms()
+        asked = _asked(task.success)
+        if not asked and task.seconds is None:
+            return None
+        found = [name for name, bound in asked.items() if not _holds(name, terms.get(name), bound)]
+        late = task.seconds is not None and self._time > task.seconds
+        return [*found, "seconds"] if late else found
+
+    def figures(self) -> dict[str, Any]:
+        """Return the terms as of the last control step, for `summary.json`."""
+        task, cut, failed = self._yardstick.task, self.cut, self.failed()
+        has_tissue = self._tissue is not None
+        return {
+            "kind": task.kind,
+            "success": None if failed is None else not failed,
+            "failed": failed or [],
+            "asked": dict(_asked(task.success)),
+            "terms": self.terms(),
+            "planned_area_m2": None if self.plan is None else self.plan.area,
+            "tolerance_m": task.tolerance,
+            "area_by_blade_m2": float(cut.area_of_cause[0]) if has_tissue else None,
+            "area_finished_m2": float(cut.area_of_cause[1]) if has_tissue else None,
+            "spared": [
+                {
+                    "label": part.name,
+                    "margin_m": part.margin,
+                    "cut_area_m2": float(cut.spared_area[i]),
+                    "distance_m": float(cut.spared_distance[i]) if cut.area > 0.0 else None,
+                }
+                for i, part in enumerate(self._yardstick.spared)
+                if has_tissue
+            ],
+            "strains": [
+                {"label": row.name, "limit": row.limit, "volume_m3": term.volume}
+                for row, term in zip(self._yardstick.strains, self._strains, strict=True)
+                if has_tissue
+            ],
+            "instruments": [_figures_of_hand(each) for each in self.hands],
+            "work_of_blade_j": self._work[0],
+            "work_of_cutting_j": self._work[1],
+            "work_of_cutting_by_label_j": list(self._work_of_labels),
+        }
+
+
+def _tissue_of(simulation: Simulation) -> Tissue | None:
+    """Return the tissue of a simulation; None where it is in another process."""
+    link = simulation.link
+    return link.tissue if isinstance(link, InProcessLink) else None
+
+
+def _terms_of_cut(cut: CutTerms, plan: Plan | None) -> dict[str, float | None]:
+    """Return the terms of what was cut of a plan, and beside it."""
+    if plan is None:
+        return {"cut_area": cut.area}
+    return {
+        "cut_area": cut.area,
+        "covered": cut.covered,
+        "off_plan": cut.off_plan,
+        "path_error": cut.path_error,
+        "path_error_largest": cut.largest_error,
+        "depth_error": cut.depth_error,
+    }
+
+
+def _asked(success: SuccessTable) -> Mapping[str, float]:
+    """Return the conditions of success that are given, by the name of their term."""
+    given = {name: getattr(success, name) for name in success.__struct_fields__}
+    return {name: float(bound) for name, bound in given.items() if bound is not None}
+
+
+def _holds(name: str, value: float | None, bound: float) -> bool:
+    """Return whether a condition holds; one of a term that is not known does not."""
+    if value is None:
+        return False
+    if name == "spared":
+        return value >= bound
+    return value >= bound if name in _AT_LEAST else value <= bound
+
+
+def _figures_of_hand(hand: HandTerms) -> dict[str, Any]:
+    """Return the figures of an instrument."""
+    return {
+        "name": hand.name,
+        "force_n": hand.force,
+        "force_limit_n": hand.limit,
+        "force_above_n": hand.force_above,
+        "impulse_ns": hand.impulse,
+        "path_length_m": hand.path_length,
+        "jerk_m_s3": hand.jerk,
+        "held": hand.held,
+        "dropped": hand.dropped if hand.can_hold else None,
+    }

@@ -1,0 +1,165 @@
+"""All that a score compares with: plan, parts to be spared, limits. It never changes in a run."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene.task_table import TaskTable
+from scalpel_sim.scoring.plan import Plan, StationSearch, plan_of
+from scalpel_sim.scoring.sampled_surface import PLAN_SPACING, SurfaceSearch, sampled_triangles
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import FloatArray, IntArray, Snapshot, boundary_faces
+
+_MOST_PLACES = 50_000
+"""Places on the surface of a part that is to be spared, about, at most."""
+
+
+class SparedPart(NamedTuple):
+    """A part of the body that is to stay whole."""
+
+    name: str
+    """Its name."""
+    label: int
+    """Its label."""
+    margin: float
+    """Distance from it that no cut may come below [m]."""
+    search: SurfaceSearch
+    """Distances from its surface at rest."""
+
+
+class StrainLimit(NamedTuple):
+    """A strain of a part of the body that is not to be passed."""
+
+    name: str | None
+    """Name of the part; None: of all that has no limit of its own."""
+    limit: float
+    """Largest principal Green-Lagrange strain."""
+    tetrahedra: IntArray
+    """Tetrahedra of the part before any cut, shape (n,)."""
+    centres: FloatArray
+    """Their middles in the body at rest [m], shape (n, 3)."""
+    volumes: FloatArray
+    """Their volumes at rest [m3], shape (n,)."""
+
+
+class Yardstick(NamedTuple):
+    """The plan and the limits of a task, in the body at rest."""
+
+    task: TaskTable
+    """The task."""
+    plan: Plan | None
+    """Its plan; None where neither the task nor a stroke says what is to be cut."""
+    plan_search: SurfaceSearch | None
+    """Distances from it."""
+    station_search: StationSearch | None
+    """Finds the depth of a cut below stations; None without a line on the skin."""
+    spared: tuple[SparedPart, ...]
+    """Parts that are to stay whole."""
+    strains: tuple[StrainLimit, ...]
+    """Limits of strain."""
+    target: int | None
+    """Label of the target; None: there is none."""
+
+    def force_limit(self, instrument: str) -> float | None:
+        """Return the force of an instrument that counts as no excess [N]; None: any."""
+        for row in self.task.limits:
+            if row.instrument == instrument and row.force is not None:
+                return row.force
+        return self.task.success.force
+
+
+def yardstick_of(
+    task: TaskTable, stroke: Stroke, body: Snapshot, names: Mapping[int, str]
+) -> Yardstick:
+    """Return what a run of a task is compared with.
+
+    Args:
+        task: The task.
+        stroke: The strokes of the scene in turn, tissue frame.
+        body: The body before them, as it lies, tissue frame.
+        names: Names of its labels.
+
+    Raises:
+        UsageError: the plan is nowhere in the body, or it has no part of a name.
+    """
+    plan = plan_of(task, stroke, body)
+    search = stations = None
+    if plan is None:
+        _expect_no_plan_needed(task)
+    else:
+        search = SurfaceSearch(plan.surface)
+        if len(plan.stations):
+            stations = StationSearch(plan.stations, plan.into, task.tolerance)
+    return Yardstick(
+        task,
+        plan,
+        search,
+        stations,
+        tuple(
+            _spared(row.label, row.margin, _label_of(row.label, names, "spare"), body)
+            for row in task.spare
+        ),
+        _strain_limits(task, body, names),
+        None if task.target is None else _label_of(task.target, names, "target"),
+    )
+
+
+def _expect_no_plan_needed(task: TaskTable) -> None:
+    """Refuse conditions of a plan where there is none."""
+    for key in ("covered", "off_plan", "path_error", "depth_error"):
+        if getattr(task.success, key) is not None:
+            raise UsageError(
+                f"[task] success has {key}, and there is no plan: give a line and a depth, or a "
+                "surface, for no stroke says what it is to cut"
+            )
+
+
+def _label_of(name: str, names: Mapping[int, str], key: str) -> int:
+    """Return the label of that name.
+
+    Raises:
+        UsageError: there is none; the message lists them.
+    """
+    for label, known in names.items():
+        if known == name:
+            return label
+    if not names:
+        raise UsageError(f"[task] {key} names '{name}', and the body has no [[label]]")
+    raise UsageError(f"[task] {key}: {unknown('label', name, names.values())}")
+
+
+def _spared(name: str, margin: float, label: int, body: Snapshot) -> SparedPart:
+    """Return a part that is to stay whole."""
+    corners = body.rest_positions[boundary_faces(body.tetrahedra[body.labels == label])]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * float(np.linalg.norm(sides, axis=1).sum())
+    # Parts of a triangle are about half the square of their longest side.
+    spacing = max(PLAN_SPACING, (2.0 * area / _MOST_PLACES) ** 0.5)
+    return SparedPart(
+        name, label, margin, SurfaceSearch(sampled_triangles(corners, spacing), spacing)
+    )
+
+
+def _strain_limits(
+    task: TaskTable, body: Snapshot, names: Mapping[int, str]
+) -> tuple[StrainLimit, ...]:
+    """Return the limits of strain; that of no label is of what has none of its own."""
+    rows = [row for row in task.limits if row.strain is not None]
+    own = {
+        row.label: _label_of(row.label, names, "limits") for row in rows if row.label is not None
+    }
+    corners = body.rest_positions[body.tetrahedra]
+    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+    found = []
+    for row in rows:
+        if row.label is None:
+            is_mine = ~np.isin(body.labels, list(own.values()))
+        else:
+            is_mine = body.labels == own[row.label]
+        mine = np.flatnonzero(is_mine)
+        assert row.strain is not None
+        middles = corners[mine].mean(axis=1)
+        found.append(StrainLimit(row.label, row.strain, mine, middles, volumes[mine]))
+    return tuple(found)

@@ -1,0 +1,188 @@
+"""The score of whole simulations: what gains nothing, what has the same bits, and success."""
+
+import json
+
+import pytest
+from msgspec import structs
+
+from scalpel_sim import SCENES, SimulationState, StrokeTable, WaypointTable, prepare
+from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.task_table import LimitTable, SpareTable, SuccessTable, TaskTable
+from scalpel_sim.strokes.scene_stroke import stroke_through
+from tissue import TetrahedralMesh
+
+TASK = TaskTable(
+    line=[(0.02, 0.001), (0.02, 0.059)],
+    depth=0.02,
+    limits=(LimitTable(strain=0.2), LimitTable(instrument="blade", force=0.5)),
+    success=SuccessTable(covered=0.95, off_plan=1e-6, force=5.0, depth_error=1e-3),
+)
+"""A cut of half the depth along the middle of the slab."""
+ALONG = {"points": [(0.02, -0.03, 0.02), (0.02, 0.07, 0.02)], "length": 0.03}
+
+
+def slab(task=TASK, **changes):
+    """Return the slab with a task, and other tables of its scene."""
+    return structs.replace(SCENES["slab"], task=task, **changes)
+
+
+def done(scene, seconds=None, stroke=None):
+    """Return the score of a scene that was done, or of a stroke in place of its own."""
+    simulation = prepare(scene, records=False)
+    if stroke is not None:
+        body = simulation.link.snapshot()
+        mesh = TetrahedralMesh(body.positions, body.tetrahedra)
+        simulation.stroke = stroke_through(mesh, [stroke])
+    simulation.run(seconds or simulation.duration + 0.1)
+    assert simulation.score is not None
+    simulation.score.look(simulation)
+    return simulation.score
+
+
+def test_the_planned_cut_succeeds():
+    score = done(slab(strokes=(StrokeTable(kind="points", **ALONG),)))
+    terms = score.terms()
+    assert score.failed() == []
+    assert terms["covered"] > 0.98
+    assert terms["off_plan"] == 0.0
+    assert terms["force"] > 0.2
+    assert terms["work"] > 0.0
+
+
+def test_pressing_without_cutting_gains_nothing():
+    score = done(slab(strokes=(StrokeTable(kind="press", depth=0.0005),)))
+    terms = score.terms()
+    assert terms["covered"] == terms["off_plan"] == terms["cut_area"] == 0.0
+    assert terms["depth_error"] == pytest.approx(0.02, rel=0.01)
+    assert terms["force"] > 0.05
+    assert terms["impulse"] > 0.0
+    assert score.failed() == ["covered", "depth_error"]
+
+
+def test_shaking_gains_nothing():
+    """The blade goes back and forth over the plan, in the air above it."""
+    start = ALONG["points"][0]
+    over = [start, (0.02, -0.02, 0.05), (0.02, 0.06, 0.05)]
+    led = StrokeTable(kind="points", points=over, length=0.03)
+    shaken = structs.replace(led, saw_amplitude=0.004, saw_frequency=8.0)
+    scene = slab(strokes=(StrokeTable(kind="points", **ALONG),))
+    terms, still = (done(scene, stroke=each).terms() for each in (shaken, led))
+    assert terms["covered"] == terms["cut_area"] == terms["force"] == 0.0
+    assert terms["jerk"] > 10.0 * still["jerk"]
+    assert terms["path_length"] > 2.0 * still["path_length"]
+
+
+def test_tearing_gains_nothing():
+    """A grasper pulls at the lobe of `retract` until the tissue slips out of its jaws."""
+    (grasper,) = SCENES["retract"].graspers
+    away = (0.15, 0.03, 0.07)
+    torn = structs.replace(
+        grasper,
+        breaks_at=0.6,
+        motion=[*grasper.motion[:3], WaypointTable(time=1.8, at=away)],
+    )
+    task = TaskTable(
+        line=[(0.06, 0.01), (0.06, 0.05)],
+        depth=0.005,
+        limits=(LimitTable(strain=0.2), LimitTable(instrument="left", force=0.2)),
+        success=SuccessTable(covered=0.5, strain_above=0.0),
+    )
+    scene = structs.replace(SCENES["retract"], task=task, graspers=(torn,))
+    score = done(scene, seconds=1.9)  # before the blade has come
+    terms = score.terms()
+    assert terms["covered"] == terms["cut_area"] == 0.0
+    assert terms["strain_above"] > 1e-8
+    assert terms["left_dropped"] == 1.0
+    assert 0.0 < terms["left_held"] < 0.8
+    assert terms["force_above"] > 0.1
+    assert score.failed() == ["covered", "strain_above"]
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Return a scene, the figures of its score at the end, and a state in its middle, as bytes."""
+    scene = slab()
+    simulation = prepare(scene, records=False)
+    half = simulation.duration / 2.0
+    simulation.run(half)
+    state = simulation.save_state()
+    simulation.run(simulation.duration)
+    return scene, simulation, state, state.to_bytes(), repr(simulation.score.figures())
+
+
+def test_the_figures_are_plain_numbers(whole):
+    figures = whole[1].score.figures()
+    again = json.loads(json.dumps(figures))
+    assert again["terms"]["covered"] > 0.9
+    assert again["instruments"][0]["name"] == "blade"
+    assert again["asked"]["covered"] == 0.95
+
+
+def test_a_state_that_is_loaded_scores_the_same_bits(whole):
+    _, simulation, state, _, figures = whole
+    for _ in range(2):
+        simulation.load_state(state)
+        assert repr(simulation.score.figures()) != figures
+        simulation.run(simulation.duration)
+        assert repr(simulation.score.figures()) == figures
+
+
+def test_a_state_from_bytes_scores_the_same_bits(whole):
+    scene, _, _, state, figures = whole
+    simulation = prepare(scene, records=False)
+    simulation.load_state(SimulationState.from_bytes(state))
+    simulation.run(simulation.duration)
+    assert repr(simulation.score.figures()) == figures
+    simulation.reset()
+    assert simulation.score.terms()["covered"] == 0.0
+
+
+def test_two_threads_score_the_same_bits(whole):
+    scene, *_, figures = whole
+    shared = structs.replace(scene, solver=structs.replace(scene.solver, threads=2))
+    simulation = prepare(shared, records=False)
+    simulation.run(simulation.duration)
+    assert repr(simulation.score.figures()) == figures
+
+
+def test_a_scene_without_a_task_has_no_score():
+    assert prepare(SCENES["slab"], records=False).score is None
+
+
+@pytest.mark.parametrize(
+    ("task", "message"),
+    [
+        (TaskTable(spare=(SpareTable(label="vessel"),)), "the body has no"),
+        (TaskTable(target="vessel"), r"\[task\] target names 'vessel'"),
+        (TaskTable(line=[(0.0, 0.1), (0.02, 0.1)], depth=0.01), "line misses the body"),
+    ],
+)
+def test_a_task_that_does_not_fit_the_body_is_refused(task, message):
+    with pytest.raises(UsageError, match=message):
+        prepare(slab(task))
+
+
+def test_success_of_a_plan_needs_one():
+    stab = StrokeTable(
+        kind="stab", points=[(0.02, 0.03, 0.05)], length=0.03, depth=0.02, forward=(0.0, 1.0, 0.0)
+    )
+    task = TaskTable(success=SuccessTable(covered=0.5))
+    with pytest.raises(UsageError, match="success has covered, and there is no plan"):
+        prepare(slab(task, strokes=(stab,)))
+
+
+def test_a_task_that_took_too_long_has_failed():
+    task = structs.replace(TASK, success=SuccessTable(), seconds=0.5)
+    assert done(slab(task)).failed() == ["seconds"]
+
+
+def test_a_camera_says_how_much_is_exposed():
+    task = TaskTable(kind="expose", target="tumour", success=SuccessTable(exposed=0.3))
+    simulation = prepare(structs.replace(SCENES["tumour"], task=task), records=False)
+    score = simulation.score
+    assert score.failed() == ["exposed"]
+    assert "exposed" not in score.terms()
+    score.look_for_target = lambda: 0.4
+    score.look(simulation)
+    assert score.terms()["exposed"] == 0.4
+    assert score.failed() == []
