@@ -35,6 +35,7 @@ from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.read import read_scene
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.served import scene_of
+from scalpel_sim.scene.task_table import TaskTable
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.tables.text_files import is_toml_file
@@ -120,7 +121,8 @@ def prepared_run(
                     name, options.tissue, options.arm, relaxation=relaxation, audits=audits
                 )
                 if strokes:
-                    asked = changed(asked, strokes=tuple(strokes), seconds=None)
+                    task = asked.task or TaskTable()  # the plan and the strokes are one thing
+                    asked = changed(asked, strokes=tuple(strokes), seconds=None, task=task)
                 link, scene, settings = _tissue_here(asked, options)
             else:
                 link, scene, settings = _tissue_elsewhere(name, options, client.connect)

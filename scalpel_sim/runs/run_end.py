@@ -25,6 +25,7 @@ from scalpel_sim.runs.file_names import (
 )
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run_folder import Outputs
+from scalpel_sim.runs.run_pictures import pictures_of
 from scalpel_sim.runs.run_report import report_of
 from scalpel_sim.saved_run.recorder import RunRecorder
 from scalpel_sim.scene.label_colours import colours_of_scene
@@ -155,7 +156,8 @@ def write_end(run: OpenRun) -> Summary:
     with attempts.of(REPLAY):
         outputs.write_replay(run.replay)
     with attempts.of(REPORT):
-        outputs.write_report(report_of(run.prepared, summary, warnings, run.hand))
+        pictures = [] if run.prepared.scene.task is None else pictures_of(simulation)
+        outputs.write_report(report_of(run.prepared, summary, warnings, run.hand, pictures))
     for path in run.prepared.exports:
         with attempts.of(str(path)):
             labels = colours_of_scene(run.prepared.scene)

@@ -13,6 +13,8 @@ from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.runs.file_names import SCENE
 from scalpel_sim.runs.prepared_run import PreparedRun
+from scalpel_sim.scene.task_table import TaskTable
+from scalpel_sim.scoring.judged_terms import judged_terms
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.kinds import STROKES
 
@@ -45,19 +47,27 @@ def report_of(
         pictures: Pictures of it.
     """
     simulation = prepared.simulation
-    limits = [] if hand else [row.force_limit for row in prepared.scene.strokes if row.force_limit]
+    scene = prepared.scene
+    limits = [] if hand else [row.force_limit for row in scene.strokes if row.force_limit]
+    if scene.task is not None and scene.task.success.force is not None:
+        limits.append(scene.task.success.force)
     return RunReport(
         title=simulation.title,
         by=f"{_who(hand)}, {datetime.now().astimezone():%d %B %Y, %H:%M %Z}",
         asked=list(_asked(prepared, hand)),
-        criteria=[
-            Criterion(label, _MEANINGS[label], figure) for label, figure in headline(summary)
-        ],
+        criteria=_criteria(summary),
         pictures=pictures,
         force=_force(simulation.recording, min(limits, default=None)),
         warnings=[each.message for each in warnings],
         facts=list(_facts(prepared, summary)),
     )
+
+
+def _criteria(summary: Summary) -> list[Criterion]:
+    """Return the terms of the score, and of a run without one the headline."""
+    if summary.score is not None:
+        return [Criterion(*term) for term in judged_terms(summary.score)]
+    return [Criterion(label, _MEANINGS[label], figure) for label, figure in headline(summary)]
 
 
 def _who(hand: Teleoperation | None) -> str:
@@ -69,11 +79,36 @@ def _who(hand: Teleoperation | None) -> str:
 
 def _asked(prepared: PreparedRun, hand: Teleoperation | None) -> Iterator[str]:
     """Yield what was to be done, in sentences."""
-    if hand is not None:
+    task = prepared.scene.task
+    if task is not None:
+        yield from _task_sentences(task)
+        if task.line is not None or task.surface is not None:
+            return
+    if hand is not None and task is None:
         yield "The blade was led by hand, and nothing was planned: this says what was done."
         return
     for row in prepared.scene.strokes:
         yield _sentence(row)
+
+
+def _task_sentences(task: TaskTable) -> Iterator[str]:
+    """Yield what a task asks for."""
+    tolerance = f"What lies within {_MM_PER_M * task.tolerance:g} mm of the plan counts as on it."
+    if task.line is not None and task.depth is not None:
+        corners = [(*point, 0.0)[:3] for point in task.line]
+        length = f"{_MM_PER_M * _length(corners):.0f} mm long, {_MM_PER_M * task.depth:.1f} mm deep"
+        yield f"{task.kind.capitalize()} along a line on the skin, {length}. {tolerance}"
+    elif task.surface is not None:
+        yield f"{task.kind.capitalize()} along the surface {task.surface}. {tolerance}"
+    else:
+        yield f"{task.kind.capitalize()} as the script has planned it. {tolerance}"
+    if task.target is not None:
+        yield f"The target is the part \u201c{task.target}\u201d."
+    for row in task.spare:
+        margin = f", by {_MM_PER_M * row.margin:g} mm at least" if row.margin else ""
+        yield f"To be spared: the part \u201c{row.label}\u201d{margin}."
+    if task.seconds is not None:
+        yield f"It was to be done within {task.seconds:g} s."
 
 
 def _sentence(row: StrokeTable) -> str:
@@ -87,7 +122,7 @@ def _sentence(row: StrokeTable) -> str:
     return f"Stroke \u201c{row.kind}\u201d: {about}{length}{depth}."
 
 
-def _length(points: Sequence[tuple[float, float, float]]) -> float:
+def _length(points: Sequence[Sequence[float]]) -> float:
     """Return the length of a line between points [m]."""
     return sum(math.dist(a, b) for a, b in pairwise(points))
 

@@ -11,7 +11,7 @@ from scalpel_sim.hands.commands import Command, DrawnLine
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import LiveState, Readings
+from scalpel_sim.viewer.scene3d import JudgedState, LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity
 
 UPDATES_PER_SECOND = 25.0
@@ -99,6 +99,8 @@ class SceneState(NamedTuple):
     """State of the run, if the page controls it."""
     values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES
     """Quantities at the vertices of the surface, for pages that show them as colours, SI."""
+    judged: JudgedState | None = None
+    """Plan and score of the run; None: it has no task."""
 
 
 class ForceRows(NamedTuple):

@@ -10,6 +10,7 @@ from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.recording.columns import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
+from scalpel_sim.viewer.judged import judged_state
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
@@ -114,6 +115,7 @@ def state_of(
         readings(simulation),
         live,
         {each: simulation.link.surface_values(each) for each in quantities},
+        judged_state(simulation),
     )
 
 

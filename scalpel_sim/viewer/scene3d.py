@@ -18,13 +18,14 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from bridge import TissueFrame
 from scalpel_sim.hands.run_controls import RunResults
 from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.recording.recording import TERMS
 from scalpel_sim.scene.label_colours import LabelColours
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.viewer.primitives import TriangleMesh
-from tissue import Energies, FloatArray, IntArray
+from tissue import BoolArray, Energies, FloatArray, IntArray
 
 _EXTENSION = {"uint8": 0x12, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
 """MessagePack extension type of each kind of typed array. Source: msgpack-lite, the decoder inside
@@ -75,6 +76,18 @@ class Readings(NamedTuple):
     """Name of each grasper, and the force of the tissue on it [N]."""
     energies: Energies | None = None
     """Energy balance: where the work of the blade went. None without an audit."""
+
+
+class JudgedState(NamedTuple):
+    """The plan of a task as a line on the skin, what of it is open, and the score so far."""
+
+    places: FloatArray
+    """Places of the line in order [m], tissue frame, shape (n, 3)."""
+    is_open: BoolArray
+    """Whether the cut is open there, shape (n,)."""
+    rows: Sequence[tuple[str, str, bool | None]]
+    """Terms of the score: name, figure with its unit, and whether it is as was asked for; None:
+    nothing was."""
 
 
 class HandState(
@@ -259,6 +272,17 @@ class Scene3D:
     def set_scales(self, tops: Mapping[str, float]) -> None:
         """Set the value of each quantity that level 255 of the meshes before stands for, SI."""
         self._add("set_scales", tops=dict(tops))
+
+    def set_judged(self, judged: JudgedState, frame: TissueFrame) -> None:
+        """Draw the line of a plan on the skin, and show the terms of the score.
+
+        Args:
+            judged: Plan and score.
+            frame: Pose of the tissue frame in the world.
+        """
+        places, is_open = frame.points_to_world(judged.places), judged.is_open.astype(np.int64)
+        self._add("set_plan", places=_pack(places, "float32"), open=_pack(is_open, "uint8"))
+        self._add("set_score", rows=judged.rows)
 
     def set_live(self, live: LiveState) -> None:
         """Show how the run is that the page controls, and its hand."""

@@ -161,6 +161,8 @@ class ScenePackets:
             scene.set_pose(f"/bodies/{body}", *position_and_rotation(state.body_poses[body]))
         if state.readings is not None:
             scene.set_readings(state.readings, ARROW_LENGTH * self._diagonal)
+        if state.judged is not None:
+            scene.set_judged(state.judged, self._frame)
         if state.live is not None:
             scene.set_live(state.live)
         return scene.take()

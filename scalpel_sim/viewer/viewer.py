@@ -33,7 +33,7 @@ from scalpel_sim.viewer.messages import (
     ViewerSettings,
 )
 from scalpel_sim.viewer.model_shapes import shapes_of
-from scalpel_sim.viewer.scene3d import LiveState, Readings
+from scalpel_sim.viewer.scene3d import JudgedState, LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity
 
 if TYPE_CHECKING:  # importing it takes half a second
@@ -164,6 +164,7 @@ class Viewer:
         readings: Readings | None = None,
         live: LiveState | None = None,
         values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
+        judged: JudgedState | None = None,
     ) -> None:
         """Show the state of the scene. Returns immediately, whatever the viewer is doing.
 
@@ -173,13 +174,14 @@ class Viewer:
             readings: Numbers to show next to the picture.
             live: How the run is, if the page controls it.
             values: The quantities `wanted`, at the vertices of the surface, SI.
+            judged: Plan and score of the run; None: it has no task.
         """
         self._last_shown = time.monotonic()
         if readings is not None:
             on_graspers = (force for _, force in readings.hands)
             self.add_forces(readings.time, math.hypot(*readings.force), *on_graspers)
         with self._changed:
-            state = self._waiting = SceneState(surface, body_poses, readings, live, values)
+            state = self._waiting = SceneState(surface, body_poses, readings, live, values, judged)
             self._changed.notify()
         self._shown = state
         if self._scene is not None:

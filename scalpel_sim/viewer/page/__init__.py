@@ -27,6 +27,7 @@ _OF_ALL_PAGES = (
     "smooth.js",
     "see_through.js",
     "ribbons.js",
+    "plan.js",
     "scene_view.js",
     "coarseness.js",
     "controls.js",

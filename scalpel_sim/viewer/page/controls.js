@@ -3,6 +3,8 @@
 
 const element = (id) => document.getElementById(id);
 
+const MOST_ON_SMALL = 3; // terms of a score that nobody asked for, on a small screen
+
 let lastReadings = null;
 
 function showReadings(readings) {
@@ -30,6 +32,21 @@ function showHands(hands) {
         row.append(term, force);
         element("area").parentElement.before(row);
     }
+}
+
+// The terms of the score: name, figure, and whether it is as was asked for; null: nothing was.
+function showScore(rows) {
+    element("score").hidden = rows.length === 0;
+    element("score").replaceChildren(...rows.map(([name, figure, isMet], i) => {
+        const row = document.createElement("div");
+        if (isMet === null && i >= MOST_ON_SMALL) row.className = "detail"; // a small screen leaves them out
+        const [term, value] = [document.createElement("dt"), document.createElement("dd")];
+        term.textContent = name[0].toLowerCase() + name.slice(1);
+        value.textContent = isMet === null ? figure : `${figure} ${isMet ? "✓" : "✗"}`;
+        if (isMet !== null) value.className = isMet ? "met" : "missed";
+        row.append(term, value);
+        return row;
+    }));
 }
 
 // A bar that shows where the work of the blade went. Terms that gave energy back are left out.
@@ -67,6 +84,8 @@ function chooseCamera(number) {
 
 const sceneView = new SceneView(element("meshcat-pane"), showReadings, offerCameras);
 window.viewer = sceneView.viewer; // the name that meshcat's own page uses
+const planLine = new PlanLine(sceneView);
+sceneView.onScore = showScore;
 const coarseness = new Coarseness(sceneView);
 
 function setWireframe(on) {

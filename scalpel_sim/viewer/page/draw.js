@@ -1,7 +1,6 @@
 // Draw a cut: lines on the skin, along which the script cuts in the run that follows.
 "use strict";
 
-const INK = 0x4b2fb0, HALO = 0xffffff; // that of a surgeon's pen, on tissue of any colour
 const FINEST_DRAG = 2.5e-3; // between two points of a drag [m]
 const LOOKED_UP_EVERY = 1.5e-3; // along a line [m]
 const MOST_POINTS = 100, MOST_LINES = 8; // as commands.py has them
@@ -27,7 +26,7 @@ class Drawing {
         this.drag = null; // the pointer that draws
         this.cursor = null; // where the keys point [pixels of the pane]
         this.fingers = new TwoFingers(view.viewer);
-        this.bands = [band("halo of the drawing", HALO, 0.9, 1), band("drawing", INK, 1, 2)];
+        this.bands = [band("halo of the drawing", HALO, 0.9, 1), band("drawing", PLANNED, 1, 2)];
         this.dots = new THREE.Group();
         view.viewer.scene.add(...this.bands, this.dots);
         document.querySelector("#looks").before(element("draw"));
@@ -213,7 +212,8 @@ class Drawing {
     lookUp() {
         if (!this.skin.isThere) return;
         this.index = this.skin.geometry.index.array;
-        this.places = this.before.flatMap(({ points, edge }) => this.onSkin(points, edge).places);
+        const before = planLine.isThere ? [] : this.before; // as the plan they are drawn already
+        this.places = before.flatMap(({ points, edge }) => this.onSkin(points, edge).places);
         const { places, isOff } = this.onSkin(this.points.map(({ rest }) => rest), this.edge);
         this.places.push(...places);
         this.isOff = isOff;
@@ -298,7 +298,7 @@ const distance = (a, b) => Math.hypot(...a.map((x, axis) => x - b[axis]));
 
 function dot() {
     const ball = (color, radius) => new THREE.Mesh(new THREE.SphereGeometry(radius, 16, 12), new THREE.MeshBasicMaterial({ color }));
-    const found = ball(INK, 0.72), rim = ball(HALO, 1);
+    const found = ball(PLANNED, 0.72), rim = ball(HALO, 1);
     rim.material.side = THREE.BackSide;
     return found.add(rim);
 }

@@ -21,6 +21,8 @@ class SceneView {
         this.onCameras = onCameras;
         this.onHand = () => {};
         this.onRun = () => {};
+        this.onPlan = () => {};
+        this.onScore = () => {};
         this.cameras = [];
         this.chosen = 0;
         this.room = room();
@@ -52,6 +54,8 @@ class SceneView {
             set_readings: (command) => this.setReadings(command),
             set_hand: (command) => this.onHand(command),
             set_run: (command) => this.onRun(command),
+            set_plan: (command) => this.onPlan(command),
+            set_score: (command) => this.onScore(command.rows),
         };
         this.viewer.handle_command = (command) => {
             (own[command.type] || meshcatHandles)(command);

@@ -1,10 +1,12 @@
 """A visitor draws a line on the tissue in the live page, and the script cuts along it."""
 
+import json
+
 import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, read_scene
-from scalpel_sim.runs.file_names import SCENE
+from scalpel_sim.runs.file_names import SCENE, SUMMARY
 from scalpel_sim.strokes.skin import BodySkin
 from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView, assert_a_run_repeats
 from tests.support.browser import new_tab
@@ -64,11 +66,14 @@ def test_the_script_cuts_along_the_line_that_was_clicked_and_the_run_repeats(tmp
         tab.wait_for_function("CHOICES.lines.length === 1")
         assert tab.evaluate("CHOICES.lines[0].points") == line["points"], "it is drawn again"
         tab.wait_for_selector("#results")
+        assert "planned cut that is open" in tab.inner_text("#score")
+        assert tab.evaluate("planLine.isOpen.filter((each) => each).length") > 20, "of some 37 mm"
         tab.close()
         assert tab.failures == []
     (stroke,) = read_scene(tmp_path / "out-2" / SCENE).strokes
     assert stroke.kind == "traced" and stroke.depth == 4e-3
     assert [list(point) for point in stroke.points] == line["points"]
+    assert json.loads((tmp_path / "out-2" / SUMMARY).read_text())["score"]["terms"]["covered"] > 0.5
     assert_a_run_repeats(tmp_path / "out-2", tmp_path / "again")
 
 
