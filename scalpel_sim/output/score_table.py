@@ -29,6 +29,8 @@ def _success(score: dict[str, Any]) -> _Rows:
     """Yield whether the task is done."""
     if score["success"] is not None:
         yield "success", "yes" if score["success"] else f"no: {', '.join(score['failed'])}"
+    elif score["unknown"]:
+        yield "success", f"not known, as is {', '.join(score['unknown'])}"
 
 
 def _cut(score: dict[str, Any]) -> _Rows:

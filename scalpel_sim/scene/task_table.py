@@ -111,6 +111,9 @@ class TaskTable(TomlTable, kw_only=True, frozen=True):
     """Distance from the plan that counts as on it [m]."""
     target: Label | None = None
     """Part of the body that is cut out, or laid bare."""
+    camera: Label | None = None
+    """Camera in whose picture the target counts as exposed: endoscope, overview, a view of the
+    scene, or a camera of your MJCF. It draws every 0.02 s; nobody looks without."""
     spare: tuple[SpareTable, ...] = ()
     """Rows of what is to be left whole: [{label = "vessel", margin = 0.002}]."""
     limits: tuple[LimitTable, ...] = ()
@@ -145,6 +148,10 @@ def check_task(task: TaskTable | None, graspers: Sequence[str]) -> None:
     for key in ("removed", "healthy", "exposed"):
         if task.target is None and getattr(task.success, key) is not None:
             raise UsageError(f"[task] success has {key} and no target is given: a label's name")
+    if task.target is None and task.camera is not None:
+        raise UsageError(
+            "[task] has a camera and no target: the name of the label that it is to see"
+        )
     if task.success.spared and not task.spare:
         raise UsageError("[task] success has spared, and spare has no rows")
     if task.success.strain_above is not None and not any(each.strain for each in task.limits):

@@ -154,13 +154,17 @@ class Score:
     def figures(self) -> dict[str, Any]:
         """Return the terms as of the last control step, for `summary.json`."""
         task, cut, failed = self._yardstick.task, self.cut, self.failed()
-        has_tissue = self._tissue is not None
+        has_tissue, terms, asked = self._tissue is not None, self.terms(), _asked(task.success)
+        unknown = [name for name in asked if name not in terms]
+        known = [name for name in failed or [] if name not in unknown]
+        is_known = failed is not None and (known or not unknown)
         return {
             "kind": task.kind,
-            "success": None if failed is None else not failed,
-            "failed": failed or [],
-            "asked": dict(_asked(task.success)),
-            "terms": self.terms(),
+            "success": not known if is_known else None,
+            "failed": known,
+            "unknown": unknown,
+            "asked": dict(asked),
+            "terms": terms,
             "planned_area_m2": None if self.plan is None else self.plan.area,
             "tolerance_m": task.tolerance,
             "area_by_blade_m2": float(cut.area_of_cause[0]) if has_tissue else None,
