@@ -53,7 +53,7 @@ class CutTimes:
         if not isinstance(link, InProcessLink):
             return
         faces = link.tissue.cut_faces(self._n_faces)
-        self._n_faces += len(faces)
+        self._n_faces += faces.n
         for corners, time in zip(faces.corners, faces.times.tolist(), strict=True):
             for corner in corners:
                 self._opened.setdefault(corner.tobytes(), time)
