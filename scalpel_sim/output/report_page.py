@@ -115,9 +115,9 @@ def _verdict(criteria: Sequence[Criterion]) -> Iterator[str]:
     is_passed = met == len(judged)
     word, look = ("Passed", "good") if is_passed else ("Not passed", "bad")
     missed = ", ".join(each.name.lower() for each in judged if not each.is_met)
-    rest = "all of them" if is_passed else f"missed: {missed}"
+    rest = "" if is_passed else f"; missed: {missed}"
     yield f'<p class="verdict {look}"><strong>{word}.</strong> '
-    yield f"{met} of {len(judged)} criteria are met; {_text(rest)}.</p>"
+    yield f"{met} of {len(judged)} criteria are met{_text(rest)}.</p>"
 
 
 def _heading(criteria: Sequence[Criterion]) -> str:
