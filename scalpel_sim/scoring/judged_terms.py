@@ -136,4 +136,4 @@ def _told(score: Mapping[str, Any], without: Collection[str]) -> Iterator[Judged
         bound = text.figure(asked[key])
         if key != "spared":
             bound += " or more" if text.is_least else " or less"
-        yield JudgedTerm(text.name, meaning, figure, bound, key not in failed)
+        yield JudgedTerm(text.name, meaning, figure, bound, key in terms and key not in failed)

@@ -15,7 +15,8 @@ SCORE = {
         "spared": 1.0,
     },
     "asked": {"covered": 0.9, "force": 0.5, "spared": 1.0, "removed": 0.95},
-    "failed": ["covered", "removed"],
+    "failed": ["covered"],
+    "unknown": ["removed"],
     "tolerance_m": 1e-3,
 }
 
