@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scalpel_sim.scoring.judged_terms import JudgedTerm
 from tissue import FloatArray
 
 _PAGE = Path(__file__).with_name("report_page.html")
@@ -24,21 +25,6 @@ _MOST_COLUMNS = 600
 
 _LEAST_PEAK = 0.1
 """Upper end of the plot at least [N]: else noise would fill it."""
-
-
-class Criterion(NamedTuple):
-    """A figure of a run that was judged, or measured only."""
-
-    name: str
-    """Name for a person."""
-    meaning: str
-    """Meaning of the figure, in a sentence."""
-    measured: str
-    """Figure with its unit."""
-    wanted: str = ""
-    """Figure that was asked for; empty: none was."""
-    is_met: bool | None = None
-    """Whether it is as was asked for; None: nothing was."""
 
 
 class ReportPicture(NamedTuple):
@@ -70,7 +56,7 @@ class RunReport(NamedTuple):
     """Hand or script, and date."""
     asked: Sequence[str]
     """Request, in sentences."""
-    criteria: Sequence[Criterion]
+    criteria: Sequence[JudgedTerm]
     """Figures, the judged ones first."""
     pictures: Sequence[ReportPicture]
     """Pictures of the run."""
@@ -106,7 +92,7 @@ def _section(title: str, parts: Sequence[str]) -> Iterator[str]:
         yield "</section>"
 
 
-def _verdict(criteria: Sequence[Criterion]) -> Iterator[str]:
+def _verdict(criteria: Sequence[JudgedTerm]) -> Iterator[str]:
     """Yield whether all that was asked for is met."""
     judged = [each for each in criteria if each.is_met is not None]
     if not judged:
@@ -120,13 +106,13 @@ def _verdict(criteria: Sequence[Criterion]) -> Iterator[str]:
     yield f"{met} of {len(judged)} criteria are met{_text(rest)}.</p>"
 
 
-def _heading(criteria: Sequence[Criterion]) -> str:
+def _heading(criteria: Sequence[JudgedTerm]) -> str:
     """Return the heading of what was measured."""
     are_judged = any(each.is_met is not None for each in criteria)
     return "How well it was done" if are_judged else "What was measured"
 
 
-def _criteria(criteria: Sequence[Criterion]) -> list[str]:
+def _criteria(criteria: Sequence[JudgedTerm]) -> list[str]:
     """Return the table of what was measured."""
     if not criteria:
         return []
@@ -136,7 +122,7 @@ def _criteria(criteria: Sequence[Criterion]) -> list[str]:
     rows.append("</thead><tbody>")
     for each in criteria:
         rows.append(f'<tr><th scope="row">{_text(each.name)}<small>{_text(each.meaning)}</small>')
-        rows.append(f'</th><td class="figure" data-label="measured">{_text(each.measured)}</td>')
+        rows.append(f'</th><td class="figure" data-label="measured">{_text(each.figure)}</td>')
         if are_judged:
             rows.append(f'<td class="figure" data-label="asked for">{_text(each.wanted)}</td>')
             rows.append(_met(each.is_met))

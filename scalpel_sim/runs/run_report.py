@@ -7,14 +7,14 @@ from itertools import pairwise
 
 from scalpel_sim.hands.teleoperation import LiveHand, Teleoperation
 from scalpel_sim.output.report import headline
-from scalpel_sim.output.report_page import Criterion, ForceCurve, ReportPicture, RunReport
+from scalpel_sim.output.report_page import ForceCurve, ReportPicture, RunReport
 from scalpel_sim.output.run_warnings import RunWarning
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.runs.file_names import SCENE
 from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.scene.task_table import TaskTable
-from scalpel_sim.scoring.judged_terms import judged_terms
+from scalpel_sim.scoring.judged_terms import JudgedTerm, judged_terms
 from scalpel_sim.strokes.kind import StrokeTable
 from scalpel_sim.strokes.kinds import STROKES
 
@@ -63,11 +63,11 @@ def report_of(
     )
 
 
-def _criteria(summary: Summary) -> list[Criterion]:
+def _criteria(summary: Summary) -> list[JudgedTerm]:
     """Return the terms of the score, and of a run without one the headline."""
     if summary.score is not None:
-        return [Criterion(*term) for term in judged_terms(summary.score)]
-    return [Criterion(label, _MEANINGS[label], figure) for label, figure in headline(summary)]
+        return judged_terms(summary.score)
+    return [JudgedTerm(label, _MEANINGS[label], figure) for label, figure in headline(summary)]
 
 
 def _who(hand: Teleoperation | None) -> str:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from scalpel_sim.output.report_page import (
-    Criterion,
     ForceCurve,
     ReportPicture,
     RunReport,
     report_html,
 )
+from scalpel_sim.scoring.judged_terms import JudgedTerm
 from tests.support.browser import local_file
 
 TIMES = np.linspace(0.0, 2.0, 2001)
@@ -25,7 +25,7 @@ def report(*criteria, **changes):
         title="organ: <traced> stroke",
         by="By a script, 30 November 2026",
         asked=["A cut along a line of 26 mm, 6 mm deep."],
-        criteria=criteria or [Criterion("cut area", "What was opened.", "151 mm²")],
+        criteria=criteria or [JudgedTerm("cut area", "What was opened.", "151 mm²")],
         pictures=[ReportPicture(PNG, "The body after the cut.")],
         force=ForceCurve(TIMES, FORCES, 0.5),
         warnings=["the cut is unfinished & short"],
@@ -35,7 +35,7 @@ def report(*criteria, **changes):
 
 
 def judged(name, is_met):
-    return Criterion(name, "What it is.", "0.91", "0.95 or more", is_met)
+    return JudgedTerm(name, "What it is.", "0.91", "0.95 or more", is_met)
 
 
 def drawn_forces(page):
