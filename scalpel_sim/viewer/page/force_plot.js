@@ -5,8 +5,7 @@ const SECONDS_SHOWN = 5; // of simulated time
 const LOWEST_PEAK = 0.1; // [N] at the upper side at least: else noise would fill the plot
 const PIXELS = 2; // of the canvas, along one of the page
 const LABEL = 12; // height of the letters [pixels of the page]
-const BLADE_LINE = "#a33b30";
-const GRASPER_LINES = ["#12509e", "#3d6b2f"];
+const LINES = ["--blade-line", "--grasper-line", "--other-line"]; // colours of the style, for light and dark
 
 class ForcePlot {
     constructor() {
@@ -15,7 +14,9 @@ class ForcePlot {
         this.canvas.id = "chart";
         this.canvas.setAttribute("role", "img");
         element("readings").append(this.canvas);
-        new ResizeObserver(() => this.rows.length > 0 && this.draw()).observe(this.canvas);
+        const drawAgain = () => this.rows.length > 0 && this.draw();
+        new ResizeObserver(drawAgain).observe(this.canvas);
+        matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAgain);
     }
 
     // All rows since the last picture. After an undo the time is an earlier one, and what came later did
@@ -57,8 +58,9 @@ class ForcePlot {
         context.clearRect(0, 0, width, height);
         context.lineWidth = 3;
         context.lineJoin = "round";
-        for (const [i, colour] of [BLADE_LINE, ...GRASPER_LINES].entries()) {
-            context.strokeStyle = colour;
+        const style = getComputedStyle(this.canvas);
+        for (const [i, colour] of LINES.entries()) {
+            context.strokeStyle = style.getPropertyValue(colour);
             context.beginPath();
             for (const [at, low, high] of this.columns(x, i + 1)) {
                 context.lineTo(at, y(low));
@@ -66,7 +68,7 @@ class ForcePlot {
             }
             context.stroke();
         }
-        context.fillStyle = "#43545b";
+        context.fillStyle = style.getPropertyValue("--soft");
         context.font = `${PIXELS * LABEL}px system-ui, sans-serif`;
         context.fillText(`${peak.toFixed(2)} N, last ${SECONDS_SHOWN} s`, 0, PIXELS * LABEL);
         this.canvas.setAttribute("aria-label",
