@@ -162,6 +162,13 @@ class Grasper:
         return Pads(self._pinch.copy(), self._axes.copy(), half)
 
     @property
+    def is_pushed_apart(self) -> bool:
+        """Whether something between the pads pushes both jaws outwards."""
+        across = self._axes[:, 0]
+        _, low, high = (float(applied[:3] @ across) for applied in self._applied)
+        return low < 0.0 < high
+
+    @property
     def wrench(self) -> Wrench:
         """Sum of all wrenches that are applied to shaft and jaws, about the site `pinch`.
 

@@ -110,6 +110,11 @@ class DrivenGrasper:
         return 0 if self.grip is None else self.grip.n_points
 
     @property
+    def holds(self) -> bool:
+        """Whether it held tissue in the last frame: by its attachment, or between its pads."""
+        return self.n_points > 0 or self.grasper.is_pushed_apart
+
+    @property
     def wrench(self) -> Wrench:
         """Wrench of the tissue on it in the last frame: see `Grasper.wrench`."""
         return self.grasper.wrench

@@ -246,8 +246,9 @@ def _cut(summary: Summary) -> _Rows:
         left = "" if each["points"] else ", released"
         yield name, f"{peak:.3f} N at most, {end:.3f} N at the end{left}"
     for hand in summary.hands:
-        held = f"{hand['points_held_most']:,} points held at most"
-        yield f"peak force, {hand['name']}", f"{hand['force_peak_n']:.3f} N, {held}"
+        n_points = hand["points_held_most"]
+        held = f", {n_points:,} points held at most" if n_points else ""  # else by friction
+        yield f"peak force, {hand['name']}", f"{hand['force_peak_n']:.3f} N{held}"
     for pair, frames in summary.touched.items():
         yield f"collision: {pair}", f"{frames:,} frames"
     yield "work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ"

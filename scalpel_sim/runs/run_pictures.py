@@ -37,10 +37,10 @@ _WIDEST_GAP = 3.0
 
 def pictures_of(simulation: Simulation) -> list[ReportPicture]:
     """Return pictures of a simulation now; none where nothing draws, which the log says."""
+    scene = simulation.scene
+    name = scene.views[0].name if scene is not None and scene.views else ENDOSCOPE
     try:
-        with Camera(
-            simulation, ENDOSCOPE, width=_WIDTH, height=_HEIGHT, samples=_SAMPLES
-        ) as camera:
+        with Camera(simulation, name, width=_WIDTH, height=_HEIGHT, samples=_SAMPLES) as camera:
             near = Image.fromarray(camera.rgb())
             marks = plan_marks(simulation)
             if marks is not None:
@@ -49,7 +49,7 @@ def pictures_of(simulation: Simulation) -> list[ReportPicture]:
     except (RunError, UsageError) as error:
         _log.info("the report has no pictures: %s", error)
         return []
-    caption = "The cut, as an endoscope sees it at the end"
+    caption = "The cut at the end"
     if marks is not None:
         caption += ": the plan is violet, and green where the cut is open"
     return [

@@ -78,7 +78,7 @@ class Score:
             dt *= self._every
             self.hands[0].move(blade.segment.tip, False, dt)
             for terms, each in zip(self.hands[1:], graspers, strict=True):
-                terms.move(each.grasper.pads.centre, each.n_points > 0, dt)
+                terms.move(each.grasper.pads.centre, each.holds, dt)
             self.look(simulation)
 
     def look(self, simulation: Simulation) -> None:

@@ -132,3 +132,15 @@ def test_its_wrench_is_the_sum_of_those_on_shaft_and_jaws_about_the_middle_betwe
     assert grasper.wrench.force == pytest.approx(force)
     assert grasper.wrench.torque == pytest.approx(torque)
     assert grasper.wrench.point == pytest.approx(grasper.pads.centre)
+
+
+@pytest.mark.parametrize(
+    ("on_low", "on_high", "expected"),
+    [(-1.0, 1.0, True), (0.0, 0.0, False), (-1.0, 0.0, False), (1.0, -1.0, False)],
+)
+def test_it_says_whether_something_between_the_pads_pushes_them_apart(on_low, on_high, expected):
+    _, data, grasper = held()
+    across = data.body(grasper.body).xmat.reshape(3, 3)[:, 0]
+    data.body(grasper.bodies[1]).xfrc_applied[:3] = on_low * across
+    data.body(grasper.bodies[2]).xfrc_applied[:3] = on_high * across
+    assert grasper.is_pushed_apart == expected

@@ -89,3 +89,7 @@ def test_the_blade_dissects_the_gallbladder_off_its_bed_and_spares_artery_and_fa
     assert areas["artery"] == areas["fat"] == 0.0
     assert abs(found["residual_of_work"]) < 0.01
     assert not any(each["kind"] == "spared" for each in found["warnings"])
+    score = found["score"]
+    assert score["success"] and score["terms"]["covered"] > 0.9
+    # The jaws close on the fundus at 0.45 s of 3.2 s, and hold it by friction to the end.
+    assert 0.7 < score["terms"]["left_held"] < 0.95 and score["terms"]["left_dropped"] == 0
