@@ -192,7 +192,7 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
         outputs.close()
 
     recorded = StrokeTable(kind="recorded", file=str(tmp_path / STROKE))
-    repeated = prepare(changed(scene, strokes=(recorded,)))
+    repeated = prepare(changed(scene, strokes=(recorded,), task=None))
     repeated.run(0.05)
     assert np.ptp(simulation.recording.vector("tip")[:, 1]) > 1e-3
     assert_same_rows(simulation.recording, repeated.recording)
