@@ -5,11 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.scoring.plan import Plan
+from scalpel_sim.strokes.asked import tetrahedra_at
 from tissue import BoolArray, FloatArray, Tissue
 
 _OPEN = 0.8
 """Share of the planned depth below a station that is cut where the line counts as open: a cut ends
 a tolerance short, and the tip of a blade rounds its bottom."""
+
+
+_ASIDE = 2e-3
+"""Distance from the plan, and below the skin, of the material that a line follows [m]: on one side
+of any cut that is near the plan. Material in the plan itself would go with either lip, in turn."""
 
 
 class PlanMarks(NamedTuple):
@@ -44,13 +50,23 @@ class MarkedPlan:
         self._shown = stations
         # Those of the plan that are nearest to the skin: stations may be outside by rounding.
         self._highest = points[by_depth[first]]
+        normals = plan.surface.normals[by_depth[first]]
+        turns = np.sign(np.einsum("ni,ni->n", normals[1:], normals[:-1]))
+        sides = np.cumprod(np.append(1.0, np.where(turns == 0.0, 1.0, turns)))
+        self._beside = _ASIDE * (sides[:, None] * normals + into)
         self._areas = plan.surface.areas
         self._planned = np.bincount(self._station, self._areas, self._n)
         self.locate(tissue)
 
     def locate(self, tissue: Tissue) -> None:
         """Look the stations up anew, where the body has gone back to an earlier state."""
-        self._points = tissue.material_points(self._highest)
+        body = tissue.snapshot()
+        followed = self._highest + self._beside
+        holders, _ = tetrahedra_at(followed, body._replace(positions=body.rest_positions))
+        self._kept = holders >= 0
+        if not self._kept.any():  # in a body that is thinner
+            self._kept[:], self._beside[:] = True, 0.0
+        self._points = tissue.material_points((self._highest + self._beside)[self._kept])
 
     def now(self, tissue: Tissue, is_covered: BoolArray) -> PlanMarks:
         """Return the line as it is.
@@ -60,5 +76,5 @@ class MarkedPlan:
             is_covered: Which places of the plan are cut, shape (n_places,).
         """
         cut = np.bincount(self._station, self._areas * is_covered, self._n)
-        is_open = (cut >= _OPEN * self._planned)[self._shown]
-        return PlanMarks(tissue.positions_of(self._points), is_open)
+        is_open = (cut >= _OPEN * self._planned)[self._shown][self._kept]
+        return PlanMarks(tissue.positions_of(self._points) - self._beside[self._kept], is_open)

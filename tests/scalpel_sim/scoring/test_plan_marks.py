@@ -42,6 +42,14 @@ def test_the_line_is_in_the_skin_and_moves_with_it(simulation):
     assert nearest.max() < 0.008  # of a mesh with nodes 10 mm apart
 
 
+def test_an_open_line_follows_one_lip_and_not_both_in_turn(simulation):
+    """The lips are apart by more than the line is rough: from station to station it is smooth."""
+    tissue = simulation.link.tissue
+    marks = MarkedPlan(simulation.score.plan, tissue).now(tissue, simulation.score.is_covered)
+    along = np.diff(marks.places[marks.is_open], axis=0)
+    assert np.abs(along[:, 0]).max() < 0.25 * np.abs(along[:, 1]).mean()
+
+
 def test_after_a_reset_nothing_of_the_line_is_open_and_it_is_where_it_was(simulation):
     assert judged_state(simulation).is_open.any()
     simulation.reset()
