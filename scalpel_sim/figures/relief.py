@@ -40,11 +40,12 @@ def with_relief(mesh: TriangleMesh, png: bytes, most: int) -> TriangleMesh:
 
 def _divided(mesh: TriangleMesh, most: int) -> TriangleMesh:
     """Return a mesh with each triangle in four, as often as it has `most` triangles at most."""
-    positions, triangles, normals, uv = mesh.positions, mesh.triangles, mesh.normals, mesh.uv
+    assert mesh.uv is not None
+    # As columns of the vertices: attributes of vertices come out wrong of trimesh 4.5.
+    vertices, triangles = np.column_stack([mesh.positions, mesh.normals, mesh.uv]), mesh.triangles
     while 4 * len(triangles) <= most:
-        at = {"normals": normals, "uv": uv}
-        positions, triangles, at = _subdivide(positions, triangles, vertex_attributes=at)
-        normals, uv = at["normals"], at["uv"]
+        vertices, triangles = _subdivide(vertices, triangles)
+    positions, normals, uv = np.split(vertices, [3, 6], axis=1)
     return TriangleMesh(positions, triangles, _unit(normals), uv)
 
 
