@@ -19,7 +19,7 @@ WINDOW = {"width": 1280, "height": 800}
 """Window of the live page [pixels]."""
 IS_TIME = "seconds => parseFloat(document.getElementById('time').textContent) >= seconds"
 IS_FINE = "() => !document.body.classList.contains('coarse')"
-"""What the page is waited for, in its own terms."""
+"""Conditions for which the page is waited, in its own terms."""
 FOR_THE_RUN = 300_000
 """Longest time for it [ms]."""
 WIDTH = 960

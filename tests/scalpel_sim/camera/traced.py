@@ -14,7 +14,7 @@ triangles on a grid of 1/256, and both ends of an edge move."""
 
 
 class Hit(NamedTuple):
-    """What a ray hits first."""
+    """Surface that a ray hits first."""
 
     depth: float
     """Depth along the line of sight [m]; infinite: nothing."""

@@ -17,7 +17,7 @@ SECONDS = 1.5
 
 
 class Truth(NamedTuple):
-    """What was simulated at a step."""
+    """State of the simulation at a step."""
 
     time: float
     snapshot: object
