@@ -4,7 +4,7 @@ import numpy as np
 
 from scalpel_sim.scoring.plan import STATION
 from scalpel_sim.scoring.sampled_surface import (
-    SurfaceSearch,
+    TriangleParts,
     parts_of_triangles,
     places_on_edges,
 )
@@ -54,22 +54,30 @@ class CutTerms:
             return
         self.area += float(faces.areas.sum())
         self.area_of_cause += np.bincount(faces.causes, faces.areas, N_CAUSES)
-        self._compare(faces.corners)
+        parts = parts_of_triangles(faces.corners, FACE_SPACING)
+        on_edges = places_on_edges(faces.corners, EDGE_SPACING)
+        self._compare(faces.corners, parts, on_edges)
+        places = np.concatenate([on_edges, parts.middles])
         for i, part in enumerate(self._yardstick.spared):
             is_within = (faces.labels == part.label).all(axis=1)
             self.spared_area[i] += float(faces.areas[is_within].sum())
             nearest = 0.0
             if not is_within.any():
-                nearest = _distance(part.search, faces.corners)
+                nearest = float(part.search.distances(places).min())
             self.spared_distance[i] = min(float(self.spared_distance[i]), nearest)
 
-    def _compare(self, corners: FloatArray) -> None:
-        """Compare faces with the plan; their corners [m] have shape (n, 3, 3)."""
+    def _compare(self, corners: FloatArray, parts: TriangleParts, on_edges: FloatArray) -> None:
+        """Compare faces with the plan.
+
+        Args:
+            corners: Their corners [m], shape (n, 3, 3).
+            parts: Their parts.
+            on_edges: Places on their edges [m], shape (n_places, 3).
+        """
         plan, search = self._yardstick.plan, self._yardstick.plan_search
         if plan is None or search is None:
             return
         tolerance, stations = self._yardstick.task.tolerance, self._yardstick.station_search
-        parts = parts_of_triangles(corners, FACE_SPACING)
         distances = search.distances(parts.middles)
         self.off_plan += float(parts.areas[distances > tolerance].sum())
         self._squares += float(parts.areas @ distances**2)
@@ -77,8 +85,7 @@ class CutTerms:
         self.largest_error = max(self.largest_error, float(search.distances(in_rows).max()))
         mark_near_triangles(plan.surface.points, in_rows, tolerance, self._is_covered)
         if stations is not None:
-            deepest = stations.deepest(places_on_edges(corners, EDGE_SPACING))
-            np.maximum(self._reached, deepest, out=self._reached)
+            np.maximum(self._reached, stations.deepest(on_edges), out=self._reached)
 
     @property
     def is_covered(self) -> BoolArray:
@@ -112,15 +119,3 @@ class CutTerms:
         margins = np.array([part.margin for part in self._yardstick.spared])
         is_whole = not self.spared_area.any()
         return bool(is_whole and (self.spared_distance >= margins).all())
-
-
-def _distance(search: SurfaceSearch, corners: FloatArray) -> float:
-    """Return the nearest distance of faces from a surface [m].
-
-    Args:
-        search: The surface.
-        corners: Of the faces [m], shape (n, 3, 3).
-    """
-    middles = parts_of_triangles(corners, FACE_SPACING).middles
-    places = np.concatenate([places_on_edges(corners, EDGE_SPACING), middles])
-    return float(search.distances(places).min())
