@@ -65,9 +65,11 @@ def _are_on_cut(snapshot: Snapshot, surface: Surface) -> BoolArray:
     A surface does not say which nodes its vertices are: they are those at the same place.
     """
     vertices = np.unique(surface.triangles[surface.is_cut])
-    on_cut = {
-        place.tobytes()
-        for place in np.hstack([surface.positions[vertices], surface.rest_positions[vertices]])
-    }
-    places = np.hstack([snapshot.positions, snapshot.rest_positions])
-    return np.array([place.tobytes() in on_cut for place in places], dtype=bool)
+    on_cut = _keys(surface.positions[vertices], surface.rest_positions[vertices])
+    return np.isin(_keys(snapshot.positions, snapshot.rest_positions), on_cut)
+
+
+def _keys(positions: FloatArray, rest_positions: FloatArray) -> np.ndarray:
+    """Return the bytes of each place now and at rest as one value, shape (n,)."""
+    places = np.hstack([positions, rest_positions])
+    return places.view(f"V{places.itemsize * places.shape[1]}").ravel()
