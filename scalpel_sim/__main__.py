@@ -6,6 +6,7 @@ import os
 import sys
 from typing import NoReturn
 
+from scalpel_sim.camera.gl_context import set_backend_aside
 from scalpel_sim.errors import EXIT_RUN_FAILED
 from scalpel_sim.runs.stop_signals import ignore_signals, interrupt_on_signals, raised_signal
 
@@ -16,9 +17,7 @@ def main() -> None:
     Signals are obeyed before the command line is loaded, which takes most of a second.
     """
     interrupt_on_signals()
-    # The program opens no window. To have one, MuJoCo loads glfw, which starts a process that looks
-    # for its library, and that writes a traceback where a signal ends the program meanwhile.
-    os.environ.setdefault("MUJOCO_GL", "disable")
+    set_backend_aside()
     # What is loaded lives as long as the process: to look for cycles in it took 0.13 s of a start.
     # `load_kernels` enables the collector again.
     gc.disable()

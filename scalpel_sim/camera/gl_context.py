@@ -1,7 +1,7 @@
 """OpenGL without a screen.
 
-`mujoco.GLContext` is chosen by `MUJOCO_GL` where MuJoCo is imported, which the program does with
-`disable`, as it opens no window. So contexts are opened here, by the modules that MuJoCo has.
+`mujoco.GLContext` is chosen by `MUJOCO_GL` where MuJoCo is imported, which the command line does
+with `disable`, as it opens no window. So contexts are opened here, by the modules that MuJoCo has.
 """
 
 import importlib
@@ -13,11 +13,17 @@ from typing import Any
 
 from scalpel_sim.errors import RunError
 
-RENDERER_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri libgl1"
+RENDERER_PACKAGES = "libegl1 libgl1-mesa-dri libopengl0"
 """Packages of Debian and Ubuntu that draw without a screen and without a graphics card."""
 
 _BACKEND = "MUJOCO_GL"
 _BACKENDS = ("egl", "osmesa", "glfw", "cgl")
+_NO_CHOICE = (
+    *("", "0", "1", "on", "off", "true", "false", "enable", "enabled", "disable", "disabled"),
+    *("glx", "wgl"),
+)
+"""Other values that MuJoCo takes. They leave the choice to the system, as windows are not meant."""
+
 _THREADS = "LP_NUM_THREADS"
 
 _ONE_THREAD = "1"
@@ -28,9 +34,33 @@ what runs beside it has a use for the other cores."""
 _opened_in: set[int] = set()
 """Processes that have opened OpenGL: this one, or one that it was forked from."""
 
+_set_aside: list[str] = []
+"""Value of `MUJOCO_GL` before `set_backend_aside`; none before that was called."""
+
 
 class RenderError(RunError):
-    """There is no OpenGL that could draw."""
+    """There is no OpenGL that could draw.
+
+    Args:
+        what: What is wrong.
+        remedy: What to do.
+    """
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(f"images cannot be drawn: {what}. {remedy}")
+        self.what, self.remedy = what, remedy
+
+
+def set_backend_aside() -> None:
+    """Keep MuJoCo from loading OpenGL, whatever `MUJOCO_GL` is; cameras still obey what it was.
+
+    For the command line, before MuJoCo is loaded, and for the processes that it starts: none opens
+    a window, and all that draws nothing works where no OpenGL does. To have a window MuJoCo loads
+    glfw, which starts a process that looks for its library, and that writes a traceback where a
+    signal ends the program meanwhile.
+    """
+    _set_aside[:] = [os.environ.get(_BACKEND, "")]
+    os.environ[_BACKEND] = "disable"
 
 
 def open_context() -> Any:
@@ -39,7 +69,7 @@ def open_context() -> Any:
     On Linux it is EGL's, which needs no screen, unless `MUJOCO_GL` says otherwise.
 
     Raises:
-        RenderError: there is none; the message says what to install.
+        RenderError: there is none, or `MUJOCO_GL` names none; the message says what to do.
     """
     expect_own_process()
     backend = _backend()
@@ -51,20 +81,30 @@ def open_context() -> Any:
             raise RuntimeError("it needs a screen")
     # The libraries that are missing show as any of these.
     except (ImportError, AttributeError, RuntimeError, OSError) as error:
-        otherwise = "" if backend == "egl" else f", and unset {_BACKEND}"
+        unset = "" if backend == "egl" else f", and unset {_BACKEND}"
         raise RenderError(
-            f"images cannot be drawn: there is no OpenGL by {backend.upper()} ({_reason(error)}). "
-            f"On Debian and Ubuntu: apt-get install {RENDERER_PACKAGES}{otherwise}"
+            f"there is no OpenGL by {backend.upper()} ({_reason(error)})",
+            f"On Debian and Ubuntu: apt-get install {RENDERER_PACKAGES}{unset}",
         ) from error
     _opened_in.add(os.getpid())
     return context
 
 
 def _backend() -> str:
-    """Return what opens OpenGL: what `MUJOCO_GL` names, or that of the system."""
-    chosen = os.environ.get(_BACKEND, "").lower().strip()
+    """Return what opens OpenGL: what `MUJOCO_GL` names, or that of the system.
+
+    Raises:
+        RenderError: it names nothing that there is.
+    """
+    asked = _set_aside[0] if _set_aside else os.environ.get(_BACKEND, "")
+    chosen = asked.lower().strip()
     if chosen in _BACKENDS:
         return chosen
+    if chosen not in _NO_CHOICE:
+        raise RenderError(
+            f"the environment variable {_BACKEND} is {asked!r}",
+            f"Unset it, or set it to {', '.join(_BACKENDS[:-1])} or {_BACKENDS[-1]}",
+        )
     return {"Linux": "egl", "Darwin": "cgl"}.get(platform.system(), "glfw")
 
 
@@ -76,9 +116,8 @@ def expect_own_process() -> None:
     """
     if _opened_in and os.getpid() not in _opened_in:
         raise RenderError(
-            "this process was forked from one that has drawn images, and OpenGL does not survive "
-            "that. Start it by `spawn` (multiprocessing.get_context), or fork before the first "
-            "image"
+            "this process was forked from one that has drawn images, which OpenGL does not survive",
+            "Start it by `spawn` (multiprocessing.get_context), or fork before the first image",
         )
 
 

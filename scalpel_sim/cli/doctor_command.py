@@ -145,16 +145,13 @@ def _browser(lacks: list[Lack]) -> str | None:
 
 def _renderer(lacks: list[Lack]) -> str | None:
     """Return the OpenGL that draws images; None where there is none, which is added."""
-    from scalpel_sim.camera.gl_context import RENDERER_PACKAGES, RenderError, renderer_name
+    from scalpel_sim.camera.gl_context import RenderError, renderer_name
 
     try:
         return renderer_name()
-    except RenderError:
-        cost = (
-            "`snapshot`, `film` and cameras do not work; all else does. On Debian and Ubuntu: "
-            f"apt-get install {RENDERER_PACKAGES}"
-        )
-        lacks.append(Lack("no OpenGL is found that draws without a screen", cost))
+    except RenderError as error:
+        cost = f"`snapshot`, `film` and cameras do not work; all else does. {error.remedy}"
+        lacks.append(Lack(error.what, cost))
         return None
 
 

@@ -4,6 +4,7 @@ import os
 import resource
 import subprocess
 import sys
+from ctypes.util import find_library
 from pathlib import Path
 
 import mujoco
@@ -15,6 +16,7 @@ from scalpel_sim.camera.canvas import Canvas, PixelSize
 from scalpel_sim.camera.finishes import Finish
 from scalpel_sim.camera.lights import Light
 from scalpel_sim.camera.viewpoints import Viewpoint
+from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED
 from scalpel_sim.viewer import primitives, textures
 from tests.support.egl import needs_renderer
 
@@ -192,7 +194,8 @@ def test_a_thousand_pictures_of_a_mesh_that_grows_leave_memory_as_it_is():
 
 def in_a_process(code: str, **environment: str) -> subprocess.CompletedProcess:
     """Run code in a process of its own without a screen."""
-    env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "MUJOCO_GL")}
+    of_this_process = ("DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
+    env = {k: v for k, v in os.environ.items() if k not in of_this_process}
     return subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
@@ -207,7 +210,7 @@ def test_without_a_driver_one_line_names_the_packages(tmp_path):
     failed = in_a_process(code, __EGL_VENDOR_LIBRARY_DIRS=str(tmp_path))
     last = failed.stderr.strip().splitlines()[-1]
     assert "images cannot be drawn: there is no OpenGL by EGL" in last
-    assert "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libgl1" in last
+    assert "apt-get install libegl1 libgl1-mesa-dri libopengl0" in last
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere GLFW is the usual one")
@@ -218,12 +221,42 @@ def test_a_backend_that_needs_a_screen_says_so_where_there_is_none():
     assert "there is no OpenGL by GLFW" in last and last.endswith("and unset MUJOCO_GL")
 
 
+needs_no_osmesa = pytest.mark.skipif(find_library("OSMesa") is not None, reason="it is there")
+
+
+@pytest.mark.parametrize(
+    ("asked", "remedy"),
+    [
+        ("nonsense", "Unset it, or set it to egl, osmesa"),
+        pytest.param("osmesa", "and unset MUJOCO_GL", marks=needs_no_osmesa),
+    ],
+)
+def test_a_backend_that_is_not_there_stops_images_alone(asked, remedy, tmp_path):
+    code = "import sys; from scalpel_sim.__main__ import main; sys.argv[1:] = {}; main()"
+    checked = in_a_process(code.format(["materials"]), MUJOCO_GL=asked)
+    assert checked.returncode == EXIT_OK, checked.stderr
+    words = ["snapshot", "slab", "--at", "0", "-o", str(tmp_path / "x.png")]
+    failed = in_a_process(code.format(words), MUJOCO_GL=asked)
+    assert failed.returncode == EXIT_RUN_FAILED
+    (line,) = failed.stderr.splitlines()
+    assert line.startswith("error: images cannot be drawn: ") and remedy in line
+
+
+@needs_no_osmesa
+def test_a_backend_that_is_not_there_is_named_where_a_name_is_imported():
+    failed = in_a_process("from scalpel_sim import prepare", MUJOCO_GL="osmesa")
+    last = failed.stderr.strip().splitlines()[-1]
+    assert last.startswith("ImportError: scalpel_sim.prepare cannot be loaded")
+    assert "MUJOCO_GL is osmesa" in last
+
+
 FORKS = """
 import os
 import numpy as np
 from scalpel_sim.camera.canvas import Canvas, PixelSize
 from scalpel_sim.camera.gl_context import RenderError
 from scalpel_sim.camera.viewpoints import Viewpoint
+from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED
 
 def draw():
     canvas = Canvas(finishes={})
