@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError, writing
+from scalpel_sim.file_lock import take_lock
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.report_page import RunReport, report_html
 from scalpel_sim.output.summary import Summary, summary_json
@@ -58,7 +59,8 @@ LOCK = ".lock"
 RESERVE = ".reserve"
 """Name of the file that takes the space for the last files."""
 
-_INSTEAD = "another --out"
+_OPTION = "--out"
+_INSTEAD = f"another {_OPTION}"
 
 
 class Outputs:
@@ -90,7 +92,7 @@ class Outputs:
         self._plotter = plotter
         make_folder(folder)
         with ExitStack() as stack:
-            stack.callback(_locked(folder))
+            stack.callback(take_lock(folder / LOCK, folder, _OPTION))
             if resumption is None:
                 self.remove_earlier_files()
             kept = FileSum() if resumption is None else resumption.forces
@@ -298,7 +300,7 @@ def check_folder(folder: Path) -> None:
         RunError: another run writes there, or the folder cannot be made or written.
     """
     make_folder(folder)
-    _locked(folder)()
+    take_lock(folder / LOCK, folder, _OPTION)()
 
 
 def make_folder(folder: Path) -> None:
@@ -321,26 +323,6 @@ def _append(file: GrowingFile, rows: bytes) -> None:
     """Add rows to a file that grows."""
     with writing(file.path, _INSTEAD):
         file.append(rows)
-
-
-def _locked(folder: Path) -> Callable[[], None]:
-    """Lock a folder for one run, and return the function that releases it.
-
-    Raises:
-        RunError: another run has it, or the folder cannot be written.
-    """
-    from filelock import FileLock, Timeout  # loading it takes 30 ms
-
-    lock = FileLock(folder / LOCK)
-    with writing(folder, _INSTEAD):
-        try:
-            lock.acquire(blocking=False)
-        except Timeout:  # an OSError, too
-            raise RunError(
-                f"{folder}: another run is writing there; wait until it has ended, or choose "
-                "another --out"
-            ) from None
-    return lock.release
 
 
 def _allocate(file: int, n_bytes: int) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scalpel_sim.errors import writing
+from scalpel_sim.file_lock import take_lock
 from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, Describe, GrowingTable, LaidOutFile
 from tissue.support import remove_unfinished, whole_file
 
@@ -20,7 +21,8 @@ copy takes seconds, and the room is that of half a minute or more."""
 
 _log = logging.getLogger(__name__)
 
-_INSTEAD = "another --record"
+_OPTION = "--record"
+_INSTEAD = f"another {_OPTION}"
 
 _UNFINISHED = ".part"
 """Ending of a file that is not in place, which `remove_unfinished` knows."""
@@ -41,13 +43,16 @@ class GrowingTables:
     The file appears under its name with the first step. Before the room of a table is used up, a
     thread lays out a file with twice as much, which then replaces it: nothing waits for the copy.
 
+    Until it is closed no other run can write the file.
+
     Args:
         path: The file; one that is there is replaced by the first step.
         tables: The tables; `STEP_TIMES` is one of them.
         describe: Writes what does not grow; also called by that thread.
 
     Raises:
-        RunError: the system refuses, or this version of HDF5 lays files out otherwise.
+        RunError: the system refuses, another run is writing the file, or this version of HDF5 lays
+            files out otherwise.
     """
 
     def __init__(self, path: Path, tables: Sequence[GrowingTable], describe: Describe) -> None:
@@ -59,9 +64,14 @@ class GrowingTables:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recording")
         self._growth: _Growth | None = None
         self._grows_early = True
-        with writing(path, _INSTEAD):
-            remove_unfinished(path)
-            self._file = self._new_file(self._next_path())
+        self._release = take_lock(path.with_name(f".{path.name}.lock"), path, _OPTION)
+        try:
+            with writing(path, _INSTEAD):
+                remove_unfinished(path)
+                self._file = self._new_file(self._next_path())
+        except BaseException:
+            self._release()
+            raise
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -163,18 +173,10 @@ class GrowingTables:
         Where the system refuses, that is logged, and the file stays as it is, with all steps.
         """
         starts, is_in_place = self._file.starts, self._is_in_place
-        self.close()
-        if not is_in_place:
-            return
-        exact = [each._replace(room=self._lengths[name]) for name, each in self._tables.items()]
+        self._end_writing()
         try:
-            with whole_file(self.path) as unfinished:
-                file = LaidOutFile(unfinished, exact, self._describe)
-                try:
-                    file.copy(self.path, starts, self._lengths)
-                    file.show(self._lengths)
-                finally:
-                    file.close()
+            if is_in_place:
+                self._leave_out_room(starts)
         except OSError as error:
             _log.warning(
                 "%s: is complete, but cannot be written anew without the room that was not used "
@@ -182,9 +184,29 @@ class GrowingTables:
                 self.path,
                 error.strerror or error,
             )
+        finally:
+            self._release()
+
+    def _leave_out_room(self, starts: Mapping[str, int]) -> None:
+        """Write the file anew without room in its tables, which begin there [bytes]."""
+        exact = [each._replace(room=self._lengths[name]) for name, each in self._tables.items()]
+        with whole_file(self.path) as unfinished:
+            file = LaidOutFile(unfinished, exact, self._describe)
+            try:
+                file.copy(self.path, starts, self._lengths)
+                file.show(self._lengths)
+            finally:
+                file.close()
 
     def close(self) -> None:
-        """Close the file as it is. May be called twice."""
+        """Close the file as it is, and let others write it. May be called twice."""
+        try:
+            self._end_writing()
+        finally:
+            self._release()
+
+    def _end_writing(self) -> None:
+        """Close the file. May be called twice."""
         self._thread.shutdown()
         if self._growth is not None:
             if self._growth.file.exception() is None:

@@ -1,6 +1,9 @@
 """Tables of a file that grows are read by HDF5 as they were shown last, at any time."""
 
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,6 +12,8 @@ import pytest
 from scalpel_sim.errors import RunError
 from scalpel_sim.saved_run.growing_tables import GrowingTables
 from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, GrowingTable
+
+ROOT = Path(__file__).parents[3]
 
 PATIENCE = 30.0
 """How long a thread may take to copy some kilobytes [s]: the machine may be busy."""
@@ -166,3 +171,37 @@ def test_a_file_continues_with_the_rows_that_are_kept(tables):
 def test_a_folder_that_is_not_there_is_named(tmp_path):
     with pytest.raises(RunError, match=r"nowhere/run\.vtkhdf: cannot be written"):
         GrowingTables(tmp_path / "nowhere" / "run.vtkhdf", TABLES, lambda _: None)
+
+
+def test_two_runs_never_write_one_file(tables, tmp_path):
+    """The second is refused, and what the first writes is all there."""
+    for i in range(9):
+        add_step(tables, i)
+        tables.commit()
+        with pytest.raises(RunError, match=r"run\.vtkhdf: another run is writing .* --record"):
+            GrowingTables(tables.path, TABLES, lambda _: None)
+    tables.finish()
+    n, pairs = read(tables.path)
+    assert n == 9 and np.array_equal(pairs, pairs_until(9))
+    second = GrowingTables(tables.path, TABLES, lambda _: None)
+    add_step(second, 0)
+    second.commit()
+    second.finish()
+    assert read(tables.path)[0] == 1
+
+
+def test_a_run_that_was_killed_stops_no_other(tmp_path):
+    path = tmp_path / "run.vtkhdf"
+    code = (
+        "import os; from pathlib import Path\n"
+        "from tests.scalpel_sim.saved_run.test_growing_tables import GrowingTables, TABLES\n"
+        f"tables = GrowingTables(Path({str(path)!r}), TABLES, lambda _: None)\n"
+        "os.kill(os.getpid(), 9)"
+    )
+    killed = subprocess.run([sys.executable, "-c", code], cwd=ROOT)
+    assert killed.returncode != 0 and list(tmp_path.glob(".run.vtkhdf.*"))
+    tables = GrowingTables(path, TABLES, lambda _: None)
+    add_step(tables, 0)
+    tables.commit()
+    tables.finish()
+    assert [each.name for each in tmp_path.iterdir()] == ["run.vtkhdf"]
