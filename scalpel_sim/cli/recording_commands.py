@@ -67,16 +67,18 @@ def export(
     at: float | None = None,
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Write the body of a recorded run at one instant to a file, for another program.
+    """Write a recorded run at one instant to a file, for another program.
 
-    The ending of the name says the format: .vtu, tetrahedra with stress, strain and labels; or the
-    surface, as .glb, .obj, .usd, .usda, .usdc (pieces, cut faces and labels by name), .ply (marked
-    on each face) or .stl (triangles alone). All are in metres; z points up, in .glb y. USD needs
-    the extra `usd` (pip install 'scalpel-sim[usd]'). For example:
+    The ending of the name says the format: .vtu, the tetrahedra of the body with stress, strain and
+    labels, or .pvd, the same at all instants, for ParaView before 5.12; .glb, .usd, .usda or .usdc,
+    its surface (pieces, cut faces and labels by name) and the arms at their poses; or the surface
+    alone, as .obj, .ply (marked on each face) or .stl (triangles alone). All are in metres; z
+    points up, in .glb y. USD needs the extra `usd` (pip install 'scalpel-sim[usd]'). For example:
 
     ```console
     scalpel-sim export run.vtkhdf --at 0.8 -o cut.vtu
     scalpel-sim export run.vtkhdf -o end.usd
+    scalpel-sim export run.vtkhdf -o run.pvd
     ```
 
     Args:
@@ -85,11 +87,21 @@ def export(
         at: Simulated time: the last step is written that is not after it [s; default: the end].
     """
     with log_to_stderr(printing):
-        from scalpel_sim.saved_run.playback import export_step
+        from scalpel_sim.saved_run.exports import PVD, export_series, export_step
         from scalpel_sim.saved_run.saved_run import SavedRun
 
         path = _recording_in(file) if file.is_dir() else file
+        is_series = out.suffix.lower() == PVD
+        if is_series and at is not None:
+            raise UsageError(f"a {PVD} file has all instants: leave out --at")
         with SavedRun(path) as run:
+            if is_series:
+                n_steps = export_series(run, out)
+                if printing.json:
+                    print(json.dumps({"file": str(out), "steps": n_steps}))
+                elif not printing.quiet:
+                    print(f"{out}: the body at {n_steps} instants, to {run.times[-1]:g} s")
+                return
             step = export_step(run, at, out)
             if printing.json:
                 print(json.dumps({"file": str(out), "time_s": step.time, "step": step.number}))

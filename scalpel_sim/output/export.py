@@ -6,7 +6,8 @@ is turned so that y points up, as the format demands.
 - STL: one mesh, all pieces together.
 - PLY: one mesh; each face has a colour, and the properties `is_cut` and `piece`.
 - OBJ: an object for each piece, its faces in the groups `skin` and `cut`.
-- GLB and USD: a node for each piece, with a mesh of its skin and a mesh of its cut faces.
+- GLB and USD: a node for each piece, with a mesh of its skin and a mesh of its cut faces; and one
+  for each body of the arm at its pose, with a mesh for each of its shapes.
 
 Pieces are numbered from 1, the largest at rest first, as in `summary.json`. Of a body with several
 labels each face of a PLY has the colour of its label, and the property `label`; groups of an OBJ
@@ -21,10 +22,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.errors import UsageError, writing
-from scalpel_sim.output.usd import USD_ENDINGS, UsdPart, expect_usd, usd_bytes
+from scalpel_sim.output.rigid_bodies import (
+    STEEL_ROUGHNESS,
+    RigidBody,
+    RigidPart,
+    group_of,
+)
+from scalpel_sim.output.surface_pieces import piece_of_vertices, surface_pieces
+from scalpel_sim.output.usd import (
+    ROUGHNESS,
+    USD_ENDINGS,
+    UsdMesh,
+    UsdNode,
+    expect_usd,
+    usd_bytes,
+)
 from scalpel_sim.scene.label_colours import LabelColours
-from tissue import CUT_COLOUR, SKIN_COLOUR, BoolArray, FloatArray, IntArray, Surface
+from tissue import CUT_COLOUR, SKIN_COLOUR, BoolArray, FloatArray, Surface
 from tissue.support import whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
@@ -37,13 +53,15 @@ _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0
 """Transform from z up to y up, the axis that GLB prescribes."""
 
 
-class SurfacePiece(NamedTuple):
-    """The closed surface of one connected piece of the body."""
+class _Exported(NamedTuple):
+    """Contents of a file."""
 
-    name: str
-    """`piece_1` for the largest at rest, and so on."""
     surface: Surface
-    """Surface of this piece alone, with vertices of its own."""
+    """Surface of the body."""
+    labels: Sequence[LabelColours]
+    """Colours of its labels, if it has several."""
+    beside: Sequence[RigidBody]
+    """Arm and surroundings."""
 
 
 class _Part(NamedTuple):
@@ -57,22 +75,31 @@ class _Part(NamedTuple):
     """Red, green, blue and opacity, 0 to 255 (sRGB)."""
 
 
-def export_surface(surface: Surface, path: Path, labels: Sequence[LabelColours] = ()) -> None:
+def export_surface(
+    surface: Surface,
+    path: Path,
+    labels: Sequence[LabelColours] = (),
+    *,
+    beside: Sequence[RigidBody] = (),
+    option: str = "--export",
+) -> None:
     """Write a body's surface in the format that the file name's ending requests.
 
     Args:
         surface: The surface.
         path: The file.
         labels: Colours of the labels of the body, if it has several.
+        beside: Arm and surroundings, which GLB and USD have.
+        option: The option that chose the file, for messages.
 
     Raises:
         UsageError: the ending is none of `ENDINGS`.
         RunError: the file cannot be written.
     """
-    _check_suffix(path, ENDINGS, "--export")
+    _check_suffix(path, ENDINGS, option)
     write = _WRITERS[path.suffix.lower()]
-    with writing(path, "another --export"), whole_file(path) as unfinished:
-        unfinished.write_bytes(write(surface, labels))
+    with writing(path, f"another {option}"), whole_file(path) as unfinished:
+        unfinished.write_bytes(write(_Exported(surface, labels, beside)))
 
 
 def check_exports(
@@ -120,73 +147,14 @@ def check_file(path: Path, suffix: str, option: str) -> None:
             path.unlink()
 
 
-def surface_pieces(surface: Surface) -> list[SurfacePiece]:
-    """Return the closed surface of each connected piece of the body, the largest at rest first."""
-    piece = piece_of_vertices(surface)
-    of_triangle = piece[surface.triangles[:, 0]]
-    found = []
-    for number in range(int(piece.max()) + 1):
-        vertices, triangles = np.flatnonzero(piece == number), of_triangle == number
-        place = np.empty(len(piece), dtype=np.int64)
-        place[vertices] = np.arange(len(vertices))
-        part = surface.part(triangles)
-        own = part._replace(
-            positions=surface.positions[vertices],
-            rest_positions=surface.rest_positions[vertices],
-            triangles=place[part.triangles],
-        )
-        found.append(SurfacePiece(f"piece_{number + 1}", own))
-    return found
-
-
-def piece_of_vertices(surface: Surface) -> IntArray:
-    """Return the number of the piece of each vertex, from 0, the largest at rest first.
-
-    Triangles that hang together through vertices are one closed shell, and pieces share no vertex.
-    A shell that encloses a negative volume is a cavity: it belongs to the piece around it.
-    """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    a, b, c = surface.triangles.T
-    n = len(surface.positions)
-    edges = np.concatenate([a, b]), np.concatenate([b, c])
-    n_shells, shell = connected_components(csr_array((np.ones(2 * len(a)), edges), shape=(n, n)))
-    corners = surface.rest_positions[surface.triangles]
-    volumes = np.bincount(shell[a], np.linalg.det(corners) / 6.0, n_shells)
-    outer = np.flatnonzero(volumes > 0.0)
-    outer = outer[np.argsort(-volumes[outer], kind="stable")]
-    piece = np.empty(n_shells, dtype=np.int64)
-    piece[outer] = np.arange(len(outer))
-    for cavity in np.flatnonzero(volumes <= 0.0):
-        point = surface.rest_positions[shell == cavity][0]
-        around = [_winding_number(point, corners[shell[a] == each]) for each in outer]
-        piece[cavity] = int(np.argmax(around))
-    found: IntArray = piece[shell]
-    return found
-
-
-def _winding_number(point: FloatArray, corners: FloatArray) -> float:
-    """Return how often closed triangles, shape (n, 3, 3), surround a point: 1 inside, 0 outside.
-
-    Source: A. Van Oosterom, J. Strackee, "The solid angle of a plane triangle", 1983.
-    """
-    a, b, c = np.moveaxis(corners - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    ab, bc, ca = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
-    angle = np.arctan2(
-        np.linalg.det(np.stack([a, b, c], 1)), la * lb * lc + ab * lc + bc * la + ca * lb
-    )
-    return float(angle.sum() / (2.0 * np.pi))
-
-
-def _stl(surface: Surface, _: Sequence[LabelColours]) -> bytes:
+def _stl(given: _Exported) -> bytes:
     """Return the surface as binary STL: triangles, and nothing else."""
-    return _exported(surface.to_trimesh(), "stl")
+    return _exported(given.surface.to_trimesh(), "stl")
 
 
-def _ply(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
+def _ply(given: _Exported) -> bytes:
     """Return the surface as binary PLY with a colour, `is_cut` and `piece` for each face."""
+    surface, labels, _ = given
     mesh = surface.to_trimesh()
     piece = piece_of_vertices(surface)[surface.triangles[:, 0]] + 1
     mesh.face_attributes["piece"] = piece.astype(np.int32)
@@ -200,17 +168,17 @@ def _ply(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
     return _exported(mesh, "ply")
 
 
-def _obj(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
+def _obj(given: _Exported) -> bytes:
     """Return the surface as OBJ text.
 
     Written here, because trimesh has no groups: skin and cut faces would not share their vertices.
     """
     lines: list[str] = []
     n_before = 1
-    for name, piece in surface_pieces(surface):
+    for name, piece in surface_pieces(given.surface):
         lines.append(f"o {name}")
         lines += (f"v {x!r} {y!r} {z!r}" for x, y, z in piece.positions.tolist())
-        for part in _parts(piece, labels):
+        for part in _parts(piece, given.labels):
             lines.append(f"g {name}_{part.name}")
             corners = (piece.triangles[part.chosen] + n_before).tolist()
             lines += (f"f {a} {b} {c}" for a, b, c in corners)
@@ -218,35 +186,74 @@ def _obj(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def _glb(surface: Surface, labels: Sequence[LabelColours]) -> bytes:
-    """Return the surface as GLB: a node for each piece, above its skin and its cut faces."""
+def _glb(given: _Exported) -> bytes:
+    """Return a GLB: a node for each piece, above its skin and its cut faces, and for each body."""
     from trimesh import Scene
 
     scene = Scene(base_frame="world")
     graph: Any = scene.graph
     graph.update("body", "world", matrix=_Y_UP)
-    for name, piece in surface_pieces(surface):
+    for name, piece in surface_pieces(given.surface):
         graph.update(name, "body")
-        for part in _parts(piece, labels):
+        for part in _parts(piece, given.labels):
             scene.add_geometry(
                 _part_mesh(piece, part),
                 node_name=f"{name}_{part.name}",
                 geom_name=f"{name}_{part.name}",
                 parent_node_name=name,
             )
+    taken = set(graph.nodes)
+
+    def node(wanted: str) -> str:
+        name = free_name(wanted, taken)
+        taken.add(name)
+        return name
+
+    groups = {group: node(group) for group in sorted({group_of(body) for body in given.beside})}
+    for name in groups.values():
+        graph.update(name, "world", matrix=_Y_UP)
+    for body in given.beside:
+        above = node(body.name)
+        graph.update(above, groups[group_of(body)], matrix=body.pose)
+        for rigid in body.parts:
+            name = node(f"{body.name}_{rigid.name}")
+            scene.add_geometry(
+                _rigid_mesh(rigid), node_name=name, geom_name=name, parent_node_name=above
+            )
     return _exported(scene, "glb")
 
 
-def _usd(ending: str, surface: Surface, labels: Sequence[LabelColours]) -> bytes:
-    """Return the surface as a USD stage: a transform for each piece, above its parts."""
-    pieces = {
-        name: [
-            UsdPart(part.name, piece.part(part.chosen), _linear(part.colour))
-            for part in _parts(piece, labels)
-        ]
-        for name, piece in surface_pieces(surface)
-    }
-    return usd_bytes(pieces, ending)
+def _usd(ending: str, given: _Exported) -> bytes:
+    """Return a USD stage: a transform for each piece, above its parts, and for each body."""
+    root = UsdNode("world")
+    tissue = root.child("body")
+    for name, piece in surface_pieces(given.surface):
+        above = tissue.child(name)
+        for part in _parts(piece, given.labels):
+            own = piece.part(part.chosen)
+            used, corners = np.unique(own.triangles, return_inverse=True)
+            above.child(
+                part.name,
+                mesh=UsdMesh(own.positions[used], corners.reshape(-1, 3), _linear(part.colour)),
+            )
+    groups: dict[str, UsdNode] = {}
+    for body in given.beside:
+        group = group_of(body)
+        if group not in groups:
+            groups[group] = root.child(group)
+        above = groups[group].child(body.name, body.pose)
+        for rigid in body.parts:
+            above.child(
+                rigid.name,
+                mesh=UsdMesh(
+                    rigid.positions,
+                    rigid.triangles,
+                    _linear(rigid.colour),
+                    rigid.normals,
+                    *((STEEL_ROUGHNESS, 1.0) if rigid.is_steel else (ROUGHNESS, 0.0)),
+                ),
+            )
+    return usd_bytes(root, ending)
 
 
 def _linear(colour: tuple[int, ...]) -> FloatArray:
@@ -278,15 +285,31 @@ def _parts(piece: Surface, labels: Sequence[LabelColours]) -> Iterator[_Part]:
 
 def _part_mesh(piece: Surface, part: _Part) -> "Trimesh":
     """Return the triangles of a part, all of one colour, as a mesh with a material."""
-    from trimesh.visual import material, texture
-
     mesh = piece.part(part.chosen).to_trimesh()
     mesh.remove_unreferenced_vertices()
-    colour = _linear(part.colour)
+    return _painted(mesh, part.colour)
+
+
+def _rigid_mesh(part: RigidPart) -> "Trimesh":
+    """Return a part of a body as a mesh with a material."""
+    from trimesh import Trimesh
+
+    mesh = Trimesh(part.positions, part.triangles, vertex_normals=part.normals, process=False)
+    return _painted(mesh, part.colour, is_steel=part.is_steel)
+
+
+def _painted(mesh: "Trimesh", colour: tuple[int, ...], *, is_steel: bool = False) -> "Trimesh":
+    """Return a mesh with a material of its own."""
+    from trimesh.visual import material, texture
+
     pbr: Any = material.PBRMaterial
     visuals: Any = texture.TextureVisuals
     mesh.visual = visuals(
-        material=pbr(baseColorFactor=colour, roughnessFactor=0.5, metallicFactor=0.0)
+        material=pbr(
+            baseColorFactor=_linear(colour),
+            roughnessFactor=STEEL_ROUGHNESS if is_steel else ROUGHNESS,
+            metallicFactor=float(is_steel),
+        )
     )
     return mesh
 
@@ -306,7 +329,7 @@ def _check_suffix(path: Path, suffixes: Sequence[str], option: str) -> None:
         raise UsageError(f"{option} is {path}; its name must end in {known}")
 
 
-_WRITERS: dict[str, Callable[[Surface, Sequence[LabelColours]], bytes]] = {
+_WRITERS: dict[str, Callable[[_Exported], bytes]] = {
     ".stl": _stl,
     ".obj": _obj,
     ".ply": _ply,

@@ -10,9 +10,11 @@ import trimesh
 from scalpel_sim import SavedRun
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
-from scalpel_sim.output.export import ENDINGS, export_surface, surface_pieces
+from scalpel_sim.output.export import ENDINGS, export_surface
+from scalpel_sim.output.surface_pieces import surface_pieces
 from scalpel_sim.scene.label_colours import LabelColours
 from tests.support import strokes
+from tests.support.usd import usd_scene
 from tissue import Material, Surface, TetrahedralMesh, Tissue, block, liver_lobe
 from tissue.mesh.pieces import piece_of_tetrahedra
 
@@ -81,40 +83,13 @@ def exported(body: Body, folder: Path, ending: str) -> trimesh.Trimesh:
 
 
 def exported_mesh(path: Path) -> trimesh.Trimesh:
-    """Read a file as one mesh whose parts share their vertices."""
+    """Read the tissue of a file as one mesh whose parts share their vertices."""
     read = usd_scene(path) if path.suffix.startswith(".usd") else trimesh.load(path)
     if isinstance(read, trimesh.Scene):
+        read.delete_geometry([name for name in read.geometry if not name.startswith("piece_")])
         read = read.to_geometry()
         read.merge_vertices(merge_tex=True, merge_norm=True)
     return read
-
-
-def usd_scene(path: Path) -> trimesh.Scene:
-    """Read a stage of USD: a mesh for each part, with its colour of linear light."""
-    from pxr import Usd, UsdGeom, UsdShade
-
-    stage, scene = Usd.Stage.Open(str(path)), trimesh.Scene()
-    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0 and UsdGeom.GetStageUpAxis(stage) == "Z"
-    assert stage.GetDefaultPrim().GetPath() == "/body"
-    for prim in stage.Traverse():
-        if not prim.IsA(UsdGeom.Mesh):
-            continue
-        mesh, material = (
-            UsdGeom.Mesh(prim),
-            UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(),
-        )
-        assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
-        points = np.array(mesh.GetPointsAttr().Get())
-        extent = [points.min(axis=0), points.max(axis=0)]
-        np.testing.assert_allclose(np.array(mesh.GetExtentAttr().Get()), extent, rtol=1e-6)
-        assert set(mesh.GetFaceVertexCountsAttr().Get()) == {3}
-        faces = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
-        shader, _, _ = material[0].ComputeSurfaceSource()
-        colour = np.array(shader.GetInput("diffuseColor").Get())
-        assert np.array_equal(mesh.GetDisplayColorAttr().Get()[0], colour)
-        part = trimesh.Trimesh(points, faces, process=False, metadata={"colour": colour})
-        scene.add_geometry(part, geom_name=f"{prim.GetParent().GetName()}_{prim.GetName()}")
-    return scene
 
 
 def assert_is_closed(mesh: trimesh.Trimesh) -> None:

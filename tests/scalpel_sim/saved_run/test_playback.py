@@ -1,4 +1,4 @@
-"""A recording is played in a page, and written as files of one instant, without simulating."""
+"""A recording is played in a page, without simulating."""
 
 import re
 
@@ -8,14 +8,11 @@ import pytest
 
 from scalpel_sim import SCENES, RunRecorder, SavedRun, prepare
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.export import ENDINGS
 from scalpel_sim.scene.scene import changed
 from scalpel_sim.viewer.looks import look_of_scene
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.packing import pack
-from tests.scalpel_sim.output.test_export import exported_mesh
 from tests.support.browser import local_file
-from tissue import read_mesh
 
 LAYERS = changed(SCENES["layers"], seconds=0.2)
 """A body of several labels."""
@@ -93,40 +90,3 @@ def test_the_slider_of_the_page_goes_forward_and_back(recorded, tab, tmp_path):
             assert tab.evaluate("player.shown") == number
             force = np.linalg.norm(run.step(number).wrench.force)
             assert tab.text_content("#force") == f"{force:.2f} N"
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_an_instant_is_written_in_each_format_of_surfaces(ending, recorded, tmp_path, capsys):
-    path = tmp_path / f"body{ending}"
-    assert command_line(["export", str(recorded), "--at", "0.1", "-o", str(path)]) == 0
-    assert capsys.readouterr().out == f"{path}: the body at 0.08 s, step 3 of 6\n"
-    with SavedRun(recorded) as run:
-        expected = run.at(0.1).surface.to_trimesh()
-    assert exported_mesh(path).volume == pytest.approx(expected.volume, rel=1e-5)
-
-
-def test_an_instant_is_written_as_tetrahedra_with_labels_and_their_names(recorded, tmp_path):
-    path = tmp_path / "body.vtu"
-    assert command_line(["export", str(recorded), "-o", str(path)]) == 0
-    mesh = read_mesh(path)
-    with SavedRun(recorded) as run:
-        step = run.step(-1)
-        assert step.time == 0.2 and set(mesh.label_names.values()) == set(run.label_names.values())
-    assert np.array_equal(mesh.positions, step.snapshot.positions)
-    assert np.array_equal(mesh.labels, step.snapshot.labels) and len(set(mesh.labels)) > 1
-    meshio = pytest.importorskip("meshio")
-    stress = meshio.read(path).cell_data["stress"][0]
-    assert np.array_equal(stress, step.deformation.stress.reshape(-1, 9).astype("f4"))
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--at", "0.21", "-o", "x.stl"], "has no instant 0.21 s; it goes from 0 to 0.2 s"),
-        (["-o", "x.dae"], "must end in .vtu, .stl, .obj, .ply, .glb, .usd, .usda or .usdc"),
-        (["-o", "nowhere/x.stl"], "there is no folder nowhere"),
-    ],
-)
-def test_an_export_that_is_not_possible_is_refused(words, said, recorded, capsys):
-    assert command_line(["export", str(recorded), *words]) == 2
-    assert said in capsys.readouterr().err
