@@ -7,7 +7,8 @@ from typing import NamedTuple, Self
 import mujoco
 import numpy as np
 
-from scalpel_sim.camera.canvas import Canvas, PixelSize, Thing
+from scalpel_sim.camera.canvas import Canvas, PixelSize
+from scalpel_sim.camera.composition import Thing
 from scalpel_sim.camera.finishes import POLISHED_STEEL
 from scalpel_sim.camera.identities import Identities
 from scalpel_sim.camera.lenses import pixels_through, sight_through

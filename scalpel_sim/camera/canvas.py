@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from bridge import TissueFrame
+from scalpel_sim.camera.composition import Composition, Thing
 from scalpel_sim.camera.finishes import Finish
 from scalpel_sim.camera.gl_context import (
     chosen_backend,
@@ -16,24 +17,10 @@ from scalpel_sim.camera.gl_context import (
     expect_own_process,
     open_context,
 )
-from scalpel_sim.camera.lenses import aim, widen_range
 from scalpel_sim.camera.lights import Light, Rgb, put_light
-from scalpel_sim.camera.render_model import Capacity, RenderModel
 from scalpel_sim.camera.viewpoints import Viewpoint
 from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import FloatArray, IntArray
-
-SHADOW_PIXELS = 2048
-"""Side of the map of a shadow [pixels]."""
-
-SPARE = 1.5
-"""Factor by which a mesh may grow before a new model is made for it."""
-
-FIRST_ROOM = Capacity(1500, 3000)
-"""Room of each mesh at first, at least: a cut begins small."""
-
-_MOST_GEOMS = 10_000
-"""Geoms and marks in a picture, at most: as many as MuJoCo's own renderer draws."""
 
 _REACH, _SHADOWED = 4.0, 0.9
 """Distance of lamps that are far away, and half the width in which they cast shadows, over the size
@@ -46,17 +33,6 @@ class PixelSize(NamedTuple):
 
     width: int
     height: int
-
-
-class Thing(NamedTuple):
-    """Meaning of a number of `Canvas.numbers`."""
-
-    mesh: str | None
-    """Name of one of the meshes; None: part of the model."""
-    kind: int = -1
-    """Kind of the part: a value of `mujoco.mjtObj`."""
-    number: int = -1
-    """Its number in the model."""
 
 
 class Canvas:
@@ -93,31 +69,23 @@ class Canvas:
     ) -> None:
         self._model = mujoco.MjSpec().compile() if model is None else model
         self._data = mujoco.MjData(self._model) if model is None else None
-        self._finishes = dict(finishes)
-        self._shadows, self._samples, self._background = shadows, samples, background
-        self._meshes: dict[str, tuple[TriangleMesh, TissueFrame]] = {}
-        self._rooms: dict[str, Capacity] = {}
-        self._stale: set[str] = set()
-        self._instead: dict[int, str] = {}
+        self._composition = Composition(
+            self._model, finishes, shadows=shadows, samples=samples, background=background
+        )
         self.option = mujoco.MjvOption()
         """MuJoCo's options of what is drawn of the model. Sites are left out."""
         self.option.sitegroup[:] = 0
         self.middle, self.extent = np.zeros(3), 1.0
         """Middle and size of what lamps that are far away shadow [m], world frame."""
-        self._scene: Any = None
         self._gl: Any = None
         self._context: Any = None
-        self._render: RenderModel | None = None
-        self._has_new_model, self._lamps_are_ours = False, False
-        self._clip = 0.0
+        self._lamps_are_ours, self._clip = False, 0.0
         self._size = PixelSize(0, 0)
-        self.n_models = 0
-        """Models that were made so far for meshes that grew."""
 
     @property
-    def _appended(self) -> list[str]:
-        """Names of the meshes that stand in no place of the model."""
-        return [name for name in self._meshes if name not in self._instead.values()]
+    def n_models(self) -> int:
+        """Models that were made so far for meshes that grew."""
+        return self._composition.n_models
 
     def put(self, name: str, mesh: TriangleMesh, frame: TissueFrame = TissueFrame()) -> None:
         """Put a mesh, or replace it; its arrays must not be changed afterwards.
@@ -127,25 +95,17 @@ class Canvas:
             mesh: Triangles with normals and, for a picture, texture coordinates.
             frame: Where its frame is in the world.
         """
-        if not len(mesh.triangles):
-            self._meshes.pop(name, None)
-            return
-        before = self._meshes.get(name)
-        if before is None or before[0] is not mesh:
-            self._stale.add(name)
-        self._meshes[name] = mesh, frame
+        self._composition.put(name, mesh, frame)
 
     def replace_geom(self, geom: int, name: str, mesh: TriangleMesh) -> None:
-        """Draw a mesh in place of a geom of the model, from now on.
+        """Draw a mesh in place of a geom of the model; call it before the first picture.
 
         Args:
             geom: MuJoCo's number of the geom.
             name: One of the names of the finishes, which no other mesh has.
             mesh: What it looks like, in its own frame.
         """
-        self._instead[geom] = name
-        self._meshes[name] = mesh, TissueFrame()
-        self._stale.add(name)
+        self._composition.replace_geom(geom, name, mesh)
 
     def aim_lamps(self, points: FloatArray) -> None:
         """Choose what lamps that are far away shadow: points of it [m], world frame, (n, 3)."""
@@ -155,7 +115,7 @@ class Canvas:
     @property
     def lenses(self) -> Sequence[mujoco.MjvGLCamera]:
         """MuJoCo's two lenses, as `look` has aimed them; one picture is of both, which are one."""
-        return list(self._scene.camera)
+        return list(self._composition.scene.camera)
 
     def look(
         self,
@@ -170,26 +130,14 @@ class Canvas:
             data: Data of the model; None where there is no model.
             lights: Lamps that replace those of the model and the one at the eye; None: those.
         """
-        if self._scene is None:
-            self._scene = mujoco.MjvScene(self._model, maxgeom=_MOST_GEOMS)
-        scene, camera = self._scene, mujoco.MjvCamera()
-        if isinstance(view, Viewpoint):
-            camera.type = mujoco.mjtCamera.mjCAMERA_USER
-            aim(scene, view, self.far)
-        else:
-            camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, view
-        data, every = data or self._data, int(mujoco.mjtCatBit.mjCAT_ALL)
-        mujoco.mjv_updateScene(self._model, data, self.option, None, camera, every, scene)
-        widen_range(scene)
-        self._replace_geoms()
-        self._append_meshes()
+        composition = self._composition
+        composition.look(view, self.far, data or self._data, self.option)
         self._lamps_are_ours = lights is not None
         if lights is not None:
-            scene.nlight = len(lights)
-            for light, into in zip(lights, scene.lights, strict=False):
+            composition.scene.nlight = len(lights)
+            for light, into in zip(lights, composition.scene.lights, strict=False):
                 reach = _REACH * self.extent
                 put_light(light, into, middle=self.middle, reach=reach)
-        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._shadows
 
     def colours(self, size: PixelSize) -> np.ndarray:
         """Return what was seen, red, green and blue as bytes, shape (height, width, 3)."""
@@ -218,16 +166,13 @@ class Canvas:
     def _numbers(self, size: PixelSize, *, depth: bool) -> tuple[IntArray, list[Thing], np.ndarray]:
         with self._as_numbers():
             colours, metres = self._drawn(size, colours=True, depth=depth)
-        own = self._appended
-        geoms = self._scene.geoms[: self._scene.ngeom - len(own)]
-        things = [Thing(None, int(geom.objtype), int(geom.objid)) for geom in geoms]
-        things += [Thing(name) for name in own]
+        things = self._composition.things()
         return colours.astype(np.int64) @ np.array([1, 256, 65536]) - 1, things, metres
 
     @contextmanager
     def _as_numbers(self) -> Iterator[None]:
         """Draw the numbers of geoms in place of colours."""
-        flags, kinds = self._scene.flags, mujoco.mjtRndFlag
+        flags, kinds = self._composition.scene.flags, mujoco.mjtRndFlag
         flags[kinds.mjRND_SEGMENT] = flags[kinds.mjRND_IDCOLOR] = True
         try:
             yield
@@ -258,43 +203,6 @@ class Canvas:
         """Depth beyond which there is nothing [m]: MuJoCo's."""
         return float(self._model.vis.map.zfar * self._model.stat.extent)
 
-    def _replace_geoms(self) -> None:
-        """Put meshes in the places of geoms."""
-        scene = self._scene
-        for geom in scene.geoms[: scene.ngeom] if self._instead else ():
-            if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid in self._instead:
-                geom.type, geom.size = mujoco.mjtGeom.mjGEOM_MESH, np.ones(3)
-                geom.rgba = np.array(self._finishes[self._instead[geom.objid]].colour)
-                self._finish(geom, self._instead[geom.objid])
-
-    def _append_meshes(self) -> None:
-        """Append the other meshes to the scene."""
-        scene = self._scene
-        for name in self._appended:
-            frame, finish, geom = (
-                self._meshes[name][1],
-                self._finishes[name],
-                scene.geoms[scene.ngeom],
-            )
-            mujoco.mjv_initGeom(
-                geom,
-                mujoco.mjtGeom.mjGEOM_MESH,
-                np.ones(3),
-                frame.origin,
-                frame.rotation.ravel(),
-                np.array(finish.colour, np.float32),
-            )
-            geom.objtype, geom.segid = mujoco.mjtObj.mjOBJ_UNKNOWN, scene.ngeom
-            self._finish(geom, name)
-            scene.ngeom += 1
-
-    def _finish(self, geom: mujoco.MjvGeom, name: str) -> None:
-        """Give a geom of the scene the mesh of a name, and its look."""
-        finish, render = self._finishes[name], self._with_room()
-        geom.dataid, geom.matid = 2 * render.mesh_number(name), render.material_number(name)
-        geom.specular, geom.shininess = finish.gloss, finish.shininess
-        geom.emission, geom.texcoord = finish.glow, finish.picture is not None
-
     def _drawn(
         self, size: PixelSize, *, colours: bool, depth: bool
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -302,7 +210,7 @@ class Canvas:
         self._open(size)
         self._context.shadowClip = _SHADOWED * self.extent if self._lamps_are_ours else self._clip
         rectangle = mujoco.MjrRect(0, 0, size.width, size.height)
-        mujoco.mjr_render(rectangle, self._scene, self._context)
+        mujoco.mjr_render(rectangle, self._composition.scene, self._context)
         rgb = np.empty((size.height, size.width, 3), np.uint8) if colours else None
         shares = np.empty((size.height, size.width), np.float32) if depth else None
         mujoco.mjr_readPixels(rgb, shares, rectangle, self._context)
@@ -311,7 +219,7 @@ class Canvas:
 
     def _metres(self, shares: np.ndarray) -> np.ndarray:
         """Return the depth that values of the reversed depth buffer stand for [m]."""
-        lens = self._scene.camera[0]
+        lens = self._composition.scene.camera[0]
         near, far = float(lens.frustum_near), float(lens.frustum_far)
         values = shares.astype(np.float64)
         if lens.orthographic:
@@ -320,62 +228,30 @@ class Canvas:
             metres = near * far / (near + values * (far - near))
         return np.minimum(metres, self.far).astype(np.float32)
 
-    def _with_room(self) -> RenderModel:
-        """Return the second model; a new one where a mesh has grown out of that which is there."""
-        grown = [
-            name
-            for name, (mesh, _) in self._meshes.items()
-            if name not in self._rooms or not self._rooms[name].holds(mesh)
-        ]
-        if self._render is not None and not grown:
-            return self._render
-        for name in self._finishes:
-            self._rooms.setdefault(name, FIRST_ROOM)
-        for name in grown:
-            self._rooms[name] = self._rooms[name].grown_for(self._meshes[name][0], SPARE)
-        self._render = RenderModel(
-            self._model,
-            self._rooms,
-            self._finishes,
-            shadow_pixels=SHADOW_PIXELS if self._shadows else 0,
-            samples=self._samples,
-            background=self._background,
-        )
-        for name, (mesh, _) in self._meshes.items():
-            self._render.write(name, mesh)
-        self._stale.clear()
-        self._has_new_model = True
-        self.n_models += 1
-        return self._render
-
     def _open(self, size: PixelSize) -> None:
-        """Make the context current, with all meshes and room for a picture of this size."""
+        """Make the context current, with room for a picture of this size."""
         if self._gl is None:
             self._gl = open_context()
         else:
             expect_own_process()
             self._gl.make_current()
-        render = self._with_room()
         larger = PixelSize(max(size.width, self._size.width), max(size.height, self._size.height))
-        if self._context is None or self._has_new_model:
-            self._make_context(render, larger)
+        if self._context is None:
+            self._make_context(larger)
         elif larger != self._size:
             mujoco.mjr_resizeOffscreen(*larger, self._context)
         self._size = larger
-        for name in self._stale & self._meshes.keys():
-            render.write(name, self._meshes[name][0])
-            mujoco.mjr_uploadMesh(render.model, self._context, render.mesh_number(name))
-        self._stale.clear()
 
-    def _make_context(self, render: RenderModel, size: PixelSize) -> None:
-        """Make MuJoCo's context of the second model, for pictures up to a size."""
-        if self._context is not None:
-            self._context.free()
-        whole = render.model.vis.global_
-        whole.offwidth, whole.offheight = size
+    def _make_context(self, size: PixelSize) -> None:
+        """Make MuJoCo's context of the second model, for pictures up to a size.
+
+        Where a mesh grows, only the scene needs more room: the context stays.
+        """
+        model = self._composition.with_room().model
+        model.vis.global_.offwidth, model.vis.global_.offheight = size
         with chosen_backend():
             font = int(mujoco.mjtFontScale.mjFONTSCALE_50)
-            self._context = mujoco.MjrContext(render.model, font)
+            self._context = mujoco.MjrContext(model, font)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self._has_new_model, self._clip = False, self._context.shadowClip
+        self._clip = self._context.shadowClip

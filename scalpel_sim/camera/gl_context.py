@@ -26,9 +26,10 @@ _NO_CHOICE = (
 
 _THREADS = "LP_NUM_THREADS"
 
-_ONE_THREAD = "1"
-"""Threads of Mesa's renderer for processors, where nobody asked for others: an image is small, and
-what runs beside it has a use for the other cores."""
+_NO_THREADS = "0"
+"""Threads of Mesa's renderer for processors besides the one that draws, where nobody asked for
+others. An image is small: to pass it to a thread and back takes a tenth of its time, and what runs
+beside it has a use for the other cores."""
 
 
 _opened_in: set[int] = set()
@@ -73,7 +74,7 @@ def open_context() -> Any:
     """
     expect_own_process()
     backend = _backend()
-    os.environ.setdefault(_THREADS, _ONE_THREAD)
+    os.environ.setdefault(_THREADS, _NO_THREADS)
     try:
         context = importlib.import_module(f"mujoco.{backend}").GLContext(1, 1)
         context.make_current()

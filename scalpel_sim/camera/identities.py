@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from scalpel_sim.arm.free_names import free_name
-from scalpel_sim.camera.canvas import Thing
+from scalpel_sim.camera.composition import Thing
 from scalpel_sim.camera.theatre import Theatre
 from scalpel_sim.viewer.primitives import edge_in_geom
 from tissue import IntArray

@@ -25,7 +25,7 @@ def aim(scene: mujoco.MjvScene, view: Viewpoint, far: float) -> None:
         view: Where from.
         far: Distance beyond which nothing is drawn [m].
     """
-    forward, up = view.axes()
+    forward, up = view.axes
     half = NEAREST * float(np.tan(np.radians(0.5 * view.fov_degrees)))
     for lens in scene.camera:
         lens.pos, lens.forward, lens.up = view.eye, forward, up

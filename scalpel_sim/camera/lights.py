@@ -82,7 +82,7 @@ def room_lights(place: Viewpoint) -> tuple[Light, ...]:
 
 def endoscope_lights(view: Viewpoint) -> tuple[Light, ...]:
     """Return the lamp of an endoscope, a little above its lens, and what walls throw back of it."""
-    forward, up = view.axes()
+    forward, up = view.axes
     return (
         Light(forward - _BESIDE_LENS * up, (0.95, 0.92, 0.88), (0.7, 0.7, 0.7)),
         Light(forward, _DARK, _DARK, (0.26, 0.25, 0.24), casts_shadow=False),

@@ -2,9 +2,12 @@
 
 MuJoCo uploads meshes, textures and materials from a compiled model, whose sizes are fixed. The
 model of the user is only read: a second one is made from its compiled arrays, with its assets under
-the same numbers, and after them meshes that have room for so many vertices and triangles. A picture
-of the scene of the first model by the context of the second shows what the first one does, to the
-byte, and those meshes.
+the same numbers, and after them what a canvas adds. A scene made from the second model has room for
+all that the first one shows; a picture of it by a context of the second shows what the first one
+does, to the byte, and those meshes.
+
+Meshes that change are flexes: MuJoCo draws a flex from arrays of the scene, where positions,
+normals and texture coordinates of the corners of its triangles are written, with nothing to upload.
 """
 
 from collections.abc import Mapping
@@ -20,7 +23,7 @@ from tissue import FloatArray, IntArray
 
 _SAME = (
     *("mesh_vert", "mesh_normal", "mesh_face", "mesh_facenormal"),
-    *("mesh_texcoord", "mesh_facetexcoord", "hfield_data", "tex_data"),
+    *("mesh_texcoord", "mesh_facetexcoord", "hfield_data", "tex_data", "flex_edge"),
 )
 """Arrays of the assets of the first model, which the second one begins with."""
 
@@ -34,22 +37,10 @@ _VISUAL = {
 
 
 class Capacity(NamedTuple):
-    """Room of a mesh."""
+    """Size of a mesh."""
 
     n_vertices: int
     n_triangles: int
-
-    def holds(self, mesh: TriangleMesh) -> bool:
-        """Return whether a mesh has room."""
-        return len(mesh.positions) <= self.n_vertices and len(mesh.triangles) <= self.n_triangles
-
-    def grown_for(self, mesh: TriangleMesh, spare: float) -> "Capacity":
-        """Return a room for a mesh too, and for it to grow by a factor."""
-        vertices, triangles = len(mesh.positions), len(mesh.triangles)
-        return Capacity(
-            max(self.n_vertices, int(spare * vertices)),
-            max(self.n_triangles, int(spare * triangles)),
-        )
 
 
 class RenderModel:
@@ -57,8 +48,9 @@ class RenderModel:
 
     Args:
         model: The first model, which stays as it is.
-        rooms: Room of each mesh that changes, by its name.
-        finishes: Look of each of these meshes.
+        rooms: Most triangles of each mesh that changes, by its name.
+        shapes: Meshes that stay as they are, by their names.
+        finishes: Look of each of all these meshes.
         shadow_pixels: Side of the map of a shadow [pixels]; 0: there are no shadows.
         samples: Samples of each pixel, against jagged edges; 0: one.
         background: Rgb where nothing is, if the first model has no sky (sRGB).
@@ -67,59 +59,59 @@ class RenderModel:
     def __init__(
         self,
         model: mujoco.MjModel,
-        rooms: Mapping[str, Capacity],
+        rooms: Mapping[str, int],
+        shapes: Mapping[str, TriangleMesh],
         finishes: Mapping[str, Finish],
         *,
         shadow_pixels: int,
         samples: int,
         background: Rgb,
     ) -> None:
-        self.rooms = dict(rooms)
-        """Room of each mesh."""
         spec = mujoco.MjSpec()
         _add_assets(spec, model)
         if mujoco.mjtTexture.mjTEXTURE_SKYBOX not in model.tex_type:
             _add_sky(spec, background)
+        for name, mesh in shapes.items():
+            _add_mesh(spec, name, mesh)
+        for name, finish in finishes.items():
+            _add_material(spec, name, finish)
         for name, room in rooms.items():
-            _add_mesh(spec, name, room)
-            _add_material(spec, name, finishes[name])
-            kind = (
-                mujoco.mjtGeom.mjGEOM_MESH
-            )  # a mesh without a geom would be left out; none collides
-            spec.worldbody.add_geom(type=kind, meshname=name, contype=0, conaffinity=0)
+            _add_room(spec, name, room)
         spec.visual.quality.shadowsize, spec.visual.quality.offsamples = shadow_pixels, samples
         self.model = spec.compile()
         """MuJoCo's model."""
         _copy(model, self.model)
-        self._meshes = {name: self.model.mesh(name).id for name in rooms}
-        self._materials = {name: self.model.material(name).id for name in rooms}
+        self._shapes = {name: self.model.mesh(name).id for name in shapes}
+        self._rooms = {name: model.nflex + i for i, name in enumerate(rooms)}
+        self._materials = {name: self.model.material(name).id for name in finishes}
+        for name, mesh in shapes.items():
+            _write_mesh(self.model, self._shapes[name], mesh)
 
-    def mesh_number(self, name: str) -> int:
-        """Return MuJoCo's number of a mesh."""
-        return int(self._meshes[name])
+    def shape_number(self, name: str) -> int:
+        """Return MuJoCo's number of a mesh that stays as it is."""
+        return int(self._shapes[name])
+
+    def room_number(self, name: str) -> int:
+        """Return MuJoCo's number of the flex that has room for a mesh."""
+        return int(self._rooms[name])
 
     def material_number(self, name: str) -> int:
         """Return MuJoCo's number of the material of a mesh."""
         return int(self._materials[name])
 
-    def write(self, name: str, mesh: TriangleMesh) -> None:
-        """Write what a mesh is, for which there must be room; a context still has to take it."""
-        model, number = self.model, self._meshes[name]
-        first, normal = int(model.mesh_vertadr[number]), int(model.mesh_normaladr[number])
-        face, n, m = int(model.mesh_faceadr[number]), len(mesh.positions), len(mesh.triangles)
-        model.mesh_vert[first : first + n] = mesh.positions
-        model.mesh_normal[normal : normal + n] = mesh.normals
-        for array in (model.mesh_face, model.mesh_facenormal, model.mesh_facetexcoord):
-            array[face : face + m] = mesh.triangles
-        if mesh.uv is not None:
-            corner = int(model.mesh_texcoordadr[number])
-            model.mesh_texcoord[corner : corner + n] = mesh.uv
-        model.mesh_vertnum[number] = model.mesh_normalnum[number] = n
-        model.mesh_texcoordnum[number], model.mesh_facenum[number] = n, m
+
+def _write_mesh(model: mujoco.MjModel, number: int, mesh: TriangleMesh) -> None:
+    """Write the arrays of a mesh, which the compiler has put into an order of its own."""
+    first, normal = int(model.mesh_vertadr[number]), int(model.mesh_normaladr[number])
+    face, n, m = int(model.mesh_faceadr[number]), len(mesh.positions), len(mesh.triangles)
+    model.mesh_vert[first : first + n] = mesh.positions
+    model.mesh_normal[normal : normal + n] = mesh.normals
+    for array in (model.mesh_face, model.mesh_facenormal, model.mesh_facetexcoord):
+        array[face : face + m] = mesh.triangles
 
 
 def _add_assets(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Add as many textures, materials, height fields, meshes, skins and planes as a model has."""
+    """Add as many textures, materials, fields, meshes, skins, flexes and planes as a model has."""
     for i in range(model.ntex):
         width, height = int(model.tex_width[i]), int(model.tex_height[i])
         channels, first = int(model.tex_nchannel[i]), int(model.tex_adr[i])
@@ -160,6 +152,11 @@ def _add_assets(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
         )
     for i in range(model.nskin):
         _add_skin(spec, model, i)
+    for i in range(model.nflex):
+        first, dimension = int(model.flex_elemdataadr[i]), int(model.flex_dim[i])
+        n_corners = int(model.flex_elemnum[i]) * (dimension + 1)
+        elements = model.flex_elem[first : first + n_corners].reshape(-1, dimension + 1)
+        _add_flex(spec, f"flex {i}", dimension, int(model.flex_vertnum[i]), elements)
     for i in range(model.ngeom):  # a plane is drawn by the number of its geom
         if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_PLANE:
             material_number = int(model.geom_matid[i])
@@ -192,11 +189,43 @@ def _add_sky(spec: mujoco.MjSpec, colour: Rgb) -> None:
     )
 
 
-def _add_mesh(spec: mujoco.MjSpec, name: str, room: Capacity) -> None:
-    """Add a mesh that has room for so much, each vertex with a normal and a place in a picture."""
-    corners = _faces(room)
-    attribute = (room.n_vertices, corners)
-    _add_shape(spec, name, room, attribute, attribute)
+def _add_mesh(spec: mujoco.MjSpec, name: str, mesh: TriangleMesh) -> None:
+    """Add a mesh that stays as it is.
+
+    With texture coordinates, though it has none, MuJoCo takes its normals as they are.
+    """
+    size = Capacity(len(mesh.positions), len(mesh.triangles))
+    attribute = (size.n_vertices, mesh.triangles)
+    _add_shape(spec, name, size, attribute, attribute)
+    # A mesh without a geom would be left out. It collides with nothing.
+    kind = mujoco.mjtGeom.mjGEOM_MESH
+    spec.worldbody.add_geom(type=kind, meshname=name, contype=0, conaffinity=0)
+
+
+def _add_room(spec: mujoco.MjSpec, name: str, n_triangles: int) -> None:
+    """Add a flex that has room for so many triangles: MuJoCo draws two for each of its own."""
+    elements = _faces(Capacity(n_triangles + 2, -(-n_triangles // 2)))
+    _add_flex(spec, name, 2, n_triangles + 2, elements)
+
+
+def _add_flex(
+    spec: mujoco.MjSpec, name: str, dimension: int, n_vertices: int, elements: IntArray
+) -> None:
+    """Add a flex of the right sizes: where it is comes with each scene.
+
+    Args:
+        spec: The model.
+        name: Name of the flex.
+        dimension: Whether its elements are lines (1), triangles (2) or tetrahedra (3).
+        n_vertices: Number of its vertices.
+        elements: Vertices of each element, shape (n, dimension + 1).
+    """
+    flex = spec.add_flex(name=name, dim=dimension)
+    flex.vertbody, flex.elem = ["world"], elements.ravel()
+    # Places that the compiler takes: no element is flat.
+    turns = np.arange(n_vertices)
+    flex.vert = np.stack([np.cos(turns), np.sin(turns), turns**2], axis=1).ravel()
+    flex.contype = flex.conaffinity = 0
 
 
 def _add_shape(

@@ -11,10 +11,10 @@ import numpy as np
 
 from scalpel_sim.camera.finishes import Finish
 from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.charts import Charts, charts_of
 from scalpel_sim.viewer.looks import Look, Ramp
 from scalpel_sim.viewer.primitives import TriangleMesh
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
-from scalpel_sim.viewer.textures import Charts, charts_of
 from tissue import FloatArray, IntArray, Surface
 
 _SKIN, _CUT = "skin", "cut"

@@ -1,7 +1,8 @@
 """Places of cameras: those of the scene and of the model, and two that are always there."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -30,20 +31,22 @@ _ASIDE = 1e-6
 """Least sine of the angle between the line of sight and the direction that points up."""
 
 
-class Viewpoint(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Viewpoint:
     """Where a camera is, and how it is turned, world frame."""
 
     eye: FloatArray
     """Where it is [m], shape (3,)."""
     target: FloatArray
     """Point in the middle of the picture [m], shape (3,)."""
-    up: FloatArray = np.array([0.0, 0.0, 1.0])
+    up: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     """Direction to the upper side of the picture, shape (3,)."""
     fov_degrees: float = DEFAULT_FOV
     """Angle from the lower to the upper side of the picture [degree]."""
 
+    @cached_property
     def axes(self) -> tuple[FloatArray, FloatArray]:
-        """Return the unit vectors forward and up of the picture, shape (3,) each."""
+        """Unit vectors forward and up of the picture, shape (3,) each."""
         forward = np.subtract(self.target, self.eye).astype(np.float64)
         forward /= np.linalg.norm(forward)
         right = np.cross(forward, self.up)

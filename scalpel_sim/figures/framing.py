@@ -1,5 +1,6 @@
 """Views in which a body fills a picture up to its margins."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ class Margins(NamedTuple):
 
 def projected(view: Viewpoint, size: PixelSize, points: FloatArray) -> FloatArray:
     """Return where points [m], shape (n, 3), are in a picture: x to the right, y down [pixels]."""
-    forward, up = view.axes()
+    forward, up = view.axes
     ahead = points - view.eye
     distance = ahead @ forward
     x = 0.5 * size.width + _scale(view, size) * (ahead @ np.cross(forward, up)) / distance
@@ -58,12 +59,12 @@ def fitted(
     for _ in range(N_FIT_STEPS):
         low, high = _box(view, size, points)
         half = np.tan(0.5 * np.radians(view.fov_degrees)) / (free / (high - low)).min()
-        view = view._replace(fov_degrees=float(2.0 * np.degrees(np.arctan(half))))
+        view = replace(view, fov_degrees=float(2.0 * np.degrees(np.arctan(half))))
         low, high = _box(view, size, points)
         across, down = (0.5 * (low + high) - middle) * pixel_at(view, size)
-        forward, up = view.axes()
+        forward, up = view.axes
         way = across * np.cross(forward, up) - down * up
-        view = view._replace(eye=view.eye + way, target=view.target + way)
+        view = replace(view, eye=view.eye + way, target=view.target + way)
     return view
 
 

@@ -185,7 +185,7 @@ def _on_level_ground(rays: Sequence[_Ray]) -> float:
 
 def _mirrored(view: Viewpoint) -> list[_Ray]:
     """Return the light that wet surfaces mirror: of the lamp, and of one behind the body."""
-    forward, _ = view.axes()
+    forward, _ = view.axes
     behind = forward * [1.0, 1.0, -1.0] + _ASIDE * np.array([-forward[1], forward[0], 0.0])
     return [
         _Ray(Light(-to, BLACK, WHITE), 1.0 / N_MIRRORED)

@@ -30,6 +30,7 @@ from scalpel_sim.runs.stop_signals import SignalInterrupt, StopSignals
 from scalpel_sim.scene.read import PARENCHYMA, PHANTOM
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.viewer.charts import charts_of
 from tissue import (
     BladeSegment,
     BladeShape,
@@ -267,7 +268,8 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     force_parts(result.contacts, before.forward)
     tissue.step(None, dt)
     tissue.chunks()
-    tissue.surface()
+    surface = tissue.surface()
+    charts_of(surface.rest_positions, surface.triangles, _SIDE).mesh(surface.positions)
     tissue.surface_values("strain")
     tissue.surface_values("stress")
     tissue.deformation()

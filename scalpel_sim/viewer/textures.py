@@ -4,10 +4,8 @@ Every texture repeats without a seam in both directions, because its noise is ma
 space. A colour ramp turns a height field into colours, so that the same picture serves as a bump
 map: dark parts lie deep.
 
-Texture coordinates come from the rest position, so that the pattern moves with the material. Each
-triangle is projected along the axis that is nearest to its normal at rest (a cube map of six
-charts). A vertex that lies in several charts becomes several vertices. A tint that varies in space
-without charts hides the seams between them.
+Texture coordinates come from the rest position, so that the pattern moves with the material. A tint
+that varies in space without charts hides the seams between the charts of the surface.
 """
 
 import functools
@@ -18,9 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
+from scalpel_sim.viewer.charts import charts_of
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look, Ramp
 from scalpel_sim.viewer.primitives import TriangleMesh
-from tissue import BoolArray, FloatArray, IntArray, Surface
+from tissue import FloatArray, IntArray, Surface
 
 TEXTURE_PIXELS = 512
 """Pixels along each side of a texture; a power of two, as mipmaps need it."""
@@ -28,25 +27,8 @@ TEXTURE_PIXELS = 512
 N_COLOURS = 64
 """Number of colours of a ramp. More cannot be seen, and cost bytes in every replay."""
 
-CREASE_COSINE = 0.87
-"""Cosine of 30 degrees. Where the normal of a chart differs by more from the normal of all
-triangles around a vertex, at rest, there is a crease, and its edge is drawn sharp: the edges of a
-box, but not the rim of an organ, whose charts meet at any angle. At 45 degrees boxes would look
-inflated."""
-
 GREYS: Ramp = ((0.0, "000000"), (1.0, "ffffff"))
 """Ramp of what is no colour."""
-
-N_CHARTS = 6
-"""Number of charts: the sides of a cube."""
-
-CHART_AXES = np.array([[1, 2], [1, 2], [0, 2], [0, 2], [0, 1], [0, 1]])
-"""Rest coordinates that serve as u and v in the charts that face -x, +x, -y, +y, -z and +z."""
-
-CHART_SHIFT = np.array(
-    [[0.0, 0.0], [0.37, 0.61], [0.71, 0.23], [0.13, 0.47], [0.59, 0.83], [0.29, 0.07]]
-)
-"""Shift of u and v in each chart, so that opposite sides of a body do not show the same pattern."""
 
 N_WAVES = 10
 """Number of plane waves that add up to the slow variation of the tint."""
@@ -257,50 +239,6 @@ def _nodes_of(triangles: IntArray, corners: IntArray) -> IntArray:
     return nodes
 
 
-class Charts(NamedTuple):
-    """Triangles of a surface as its charts have them: what stays while the body only deforms."""
-
-    nodes: IntArray
-    """Vertex of the surface that each vertex of the charts is, shape (n_vertices,)."""
-    corners: IntArray
-    """Vertices of the charts at the corners of the triangles, shape (n_triangles, 3)."""
-    triangles: IntArray
-    """Vertices of the surface at these corners, shape (n_triangles, 3)."""
-    is_on_crease: BoolArray
-    """Whether each vertex lies on a crease of the body at rest, shape (n_vertices,)."""
-    uv: FloatArray
-    """Texture coordinates of each vertex in repeats, shape (n_vertices, 2)."""
-
-    def mesh(self, positions: FloatArray) -> TriangleMesh:
-        """Return the triangles where the vertices of the surface are now [m], without tints."""
-        n = len(self.nodes)
-        faces = _area_normals(positions, self.triangles)
-        of_node = _gather(faces, self.triangles, len(positions))[self.nodes]
-        of_chart = _gather(faces, self.corners, n)
-        normals = _unit(np.where(self.is_on_crease[:, None], of_chart, of_node))
-        return TriangleMesh(positions[self.nodes], self.corners, normals, self.uv)
-
-
-def charts_of(rest_positions: FloatArray, triangles: IntArray, tile: float) -> Charts:
-    """Return the charts of some triangles of a surface.
-
-    Args:
-        rest_positions: Of the vertices of the surface [m], shape (n, 3).
-        triangles: The triangles, shape (n_triangles, 3).
-        tile: Length of the material that one repeat of the texture covers [m].
-    """
-    rest_faces = _area_normals(rest_positions, triangles)
-    axis = np.abs(rest_faces).argmax(axis=1)
-    upward = np.take_along_axis(rest_faces, axis[:, None], axis=1)[:, 0] > 0.0
-    corner_keys = N_CHARTS * triangles + (2 * axis + upward)[:, None]
-    keys, corners = _unique(corner_keys, N_CHARTS * len(rest_positions))
-    nodes, chart = keys // N_CHARTS, keys % N_CHARTS
-    is_on_crease = _is_on_crease(rest_faces, triangles, corners, nodes, len(rest_positions))
-    rest = rest_positions[nodes]
-    uv = np.take_along_axis(rest, CHART_AXES[chart], axis=1) / tile + CHART_SHIFT[chart]
-    return Charts(nodes, corners, triangles, is_on_crease, uv)
-
-
 def _textured_triangles(
     surface: Surface,
     triangles: IntArray,
@@ -324,37 +262,6 @@ def _unique(keys: IntArray, n_keys: int) -> tuple[IntArray, IntArray]:
     index = np.cumsum(occurs) - 1
     found: IntArray = index[keys]
     return np.flatnonzero(occurs), found
-
-
-def _area_normals(positions: FloatArray, triangles: IntArray) -> FloatArray:
-    """Return the normal of each triangle, twice its area long; shape (n_triangles, 3)."""
-    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
-    normals: FloatArray = np.cross(b - a, c - a)
-    return normals
-
-
-def _is_on_crease(
-    rest_faces: FloatArray, triangles: IntArray, corners: IntArray, node: IntArray, n_nodes: int
-) -> BoolArray:
-    """Return whether each vertex lies on a crease of the body at rest, shape (n_vertices,)."""
-    of_chart = _unit(_gather(rest_faces, corners, len(node)))
-    of_node = _unit(_gather(rest_faces, triangles, n_nodes))[node]
-    creased: BoolArray = np.einsum("ij,ij->i", of_chart, of_node) < CREASE_COSINE
-    return creased
-
-
-def _gather(faces: FloatArray, corners: IntArray, n_vertices: int) -> FloatArray:
-    """Return the sum of the normals of the triangles at each vertex, shape (n_vertices, 3)."""
-    flat = corners.ravel()
-    return np.stack(
-        [np.bincount(flat, np.repeat(faces[:, i], 3), n_vertices) for i in range(3)], axis=1
-    )
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    """Return the vectors at unit length; a zero vector becomes (0, 0, 1)."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
 
 
 def _tints(points: FloatArray, variation: float) -> FloatArray:

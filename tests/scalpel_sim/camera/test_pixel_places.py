@@ -34,7 +34,7 @@ def pixels_of(camera: Camera, name: str, n: int) -> np.ndarray:
 def projected(camera: Camera, points: np.ndarray) -> np.ndarray:
     """Places in the image of points of the world, by the pinhole formula; columns and rows."""
     view = camera._view
-    forward, up = view.axes()
+    forward, up = view.axes
     offsets = points - view.eye
     by_depth = offsets / (offsets @ forward)[:, None]
     scale = 0.5 * camera.height / np.tan(np.radians(0.5 * view.fov_degrees))
@@ -60,7 +60,7 @@ def test_the_places_are_as_deep_as_the_image_says(organ):
     points = pixels_to_points(organ, pixels)
     tissue = organ.theatre.link.tissue
     now = organ.theatre.frame.points_to_world(tissue.positions_of(tissue.material_points(points)))
-    forward, _ = organ._view.axes()
+    forward, _ = organ._view.axes
     columns, rows = np.floor(pixels).astype(int).T
     np.testing.assert_allclose((now - organ._view.eye) @ forward, depth[rows, columns], atol=1e-4)
 
@@ -69,7 +69,7 @@ def test_lines_of_sight_go_through_the_middle_and_the_corner_of_the_image():
     simulation = prepare(SCENES["slab"])
     camera = Camera(simulation, "overview", width=64, height=48)
     eye, ways = camera.lines_of_sight(np.array([[32.0, 24.0], [0.0, 0.0]]))
-    forward, up = camera._view.axes()
+    forward, up = camera._view.axes
     np.testing.assert_allclose(eye, camera._view.eye, atol=1e-6)
     np.testing.assert_allclose(ways[0], forward, atol=1e-6)
     half = np.tan(np.radians(0.5 * camera._view.fov_degrees))

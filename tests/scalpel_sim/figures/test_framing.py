@@ -21,7 +21,7 @@ def test_what_is_framed_fills_the_picture_up_to_its_margins(towards_eye):
 
 def test_a_line_as_long_as_a_pixel_at_the_target_is_a_pixel_long():
     view = fitted(BOX, np.array([0.1, -0.4, 0.3]), SIZE, Margins(0.1, 0.1, 0.1))
-    forward, up = view.axes()
+    forward, up = view.axes
     ends = view.target + pixel_at(view, SIZE) * np.stack([0.0 * up, np.cross(forward, up), up])
     seen = projected(view, SIZE, ends)
     assert seen - seen[0] == pytest.approx(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, -1.0]]))

@@ -1,5 +1,7 @@
 """Pictures of the studio: light, shadow, wet surfaces, and lines."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from scalpel_sim.camera.canvas import PixelSize
@@ -53,7 +55,7 @@ def test_a_wet_surface_mirrors_white_and_hides_no_more_than_a_part_of_it(monkeyp
 
 def test_lines_in_front_are_dark_and_lines_behind_are_pale():
     body, surface, _ = moment(block(cells=(1, 1, 1), size=(0.04, 0.04, HIGH)))
-    near = VIEW._replace(fov_degrees=18.0)
+    near = replace(VIEW, fov_degrees=18.0)
     image = draw_mesh(near, SIZE, body, surface).mean(axis=2)
     for point, low, high in (
         ([0.02, 0.0, HIGH], 0.1, 0.5),  # on an edge in front
