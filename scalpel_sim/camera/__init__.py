@@ -4,7 +4,6 @@ film           the pictures of a film
 film_files     films as files
 force_panel    a plot beside a film
 image_files    images as files
-played_camera  a camera of a recorded run
 camera         a camera of a simulation, or of a model and tissue of your own
 theatre        what cameras see: a model, its data, and the tissue beside it
 tissue_parts   the surface of a body as textured meshes, one for each label

@@ -45,6 +45,19 @@ class CameraImage(NamedTuple):
     """Number of what each pixel shows, int32, shape (height, width): see `Camera.ids`."""
 
 
+def image_size(width: int, height: int) -> PixelSize:
+    """Return the size of images [pixels].
+
+    Raises:
+        UsageError: an image cannot have it.
+    """
+    if not all(1 <= side <= _MOST_PIXELS for side in (width, height)):
+        raise UsageError(
+            f"an image of {width} x {height} pixels: each side must have 1 to {_MOST_PIXELS}"
+        )
+    return PixelSize(width, height)
+
+
 class Camera:
     """A camera that sees the arm and the tissue as they are when an image is taken.
 
@@ -86,7 +99,7 @@ class Camera:
     ) -> None:
         theatre = sees if isinstance(sees, Theatre) else theatre_of(sees)
         self._stage = _Stage(theatre, shadows=shadows, samples=samples)
-        self._aim(name or usual_camera(theatre.views), PixelSize(width, height), lights)
+        self._aim(name or usual_camera(theatre.views), image_size(width, height), lights)
 
     def another(
         self,
@@ -109,16 +122,11 @@ class Camera:
         """
         other = Camera.__new__(Camera)
         other._stage = self._stage
-        other._aim(name, PixelSize(width or self.width, height or self.height), lights)
+        other._aim(name, image_size(width or self.width, height or self.height), lights)
         return other
 
     def _aim(self, name: str, size: PixelSize, lights: Sequence[Light] | None) -> None:
         """Choose the place, the size and the lamps."""
-        if not all(1 <= side <= _MOST_PIXELS for side in size):
-            raise UsageError(
-                f"an image of {size.width} x {size.height} pixels: each side must have 1 to "
-                f"{_MOST_PIXELS}"
-            )
         self.name = name
         """Name of the camera."""
         self._size = size

@@ -1,6 +1,7 @@
 """Numbers that say what a pixel shows: the same for each picture of a scene."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.camera.composition import Thing
 from scalpel_sim.camera.theatre import Theatre
+from scalpel_sim.viewer.model_shapes import arm_bodies
 from scalpel_sim.viewer.primitives import edge_in_geom
 from tissue import IntArray
 
@@ -17,6 +19,41 @@ _NOTHING, _BLADE, _ARM, _WORLD = "nothing", "blade", "arm", "world"
 _KINDS = mujoco.mjtObj
 _OF_ARM = {int(kind) for kind in (_KINDS.mjOBJ_TENDON, _KINDS.mjOBJ_SITE, _KINDS.mjOBJ_SKIN)}
 """Kinds of parts of a model, besides geoms, that belong to arms."""
+
+
+class IdentityTable(NamedTuple):
+    """Numbers of what cameras see."""
+
+    by_name: dict[str, int]
+    """The numbers by the names that users see; 0 is `nothing`. What has the name of a part of the
+    tissue is called otherwise."""
+    blade: int
+    graspers: dict[str, int]
+    """Of each grasper, by its own name."""
+    arm: int
+    """Of the rest of the arms."""
+    world: int
+
+
+def identity_table(parts: Sequence[str], graspers: Iterable[str]) -> IdentityTable:
+    """Return the numbers of nothing, the tissue, the blade, graspers, the arms, and the world.
+
+    Args:
+        parts: Names of the parts of the tissue, in order.
+        graspers: Names of the graspers.
+    """
+    names, graspers = [_NOTHING, *parts], list(graspers)
+    first = len(names)
+    for name in (_BLADE, *graspers, _ARM, _WORLD):
+        names.append(free_name(name, names))
+    blade, *of_graspers, arm, world = range(first, len(names))
+    return IdentityTable(
+        {name: i for i, name in enumerate(names)},
+        blade,
+        dict(zip(graspers, of_graspers, strict=True)),
+        arm,
+        world,
+    )
 
 
 class Identities:
@@ -30,15 +67,12 @@ class Identities:
     """
 
     def __init__(self, theatre: Theatre, parts: Sequence[str]) -> None:
-        taken = [_NOTHING, *parts]
-        own: list[str] = []
-        for name in (_BLADE, *theatre.graspers, _ARM, _WORLD):
-            own.append(free_name(name, [*taken, *own]))
-        self.table: dict[str, int] = {name: i for i, name in enumerate([*taken, *own])}
+        numbers = identity_table(parts, theatre.graspers)
+        self.table = numbers.by_name
         """The numbers by name; 0 is `nothing`."""
         self._parts = {name: self.table[name] for name in parts}
-        self._arm, self._world = self.table[own[-2]], self.table[own[-1]]
-        self._geoms = self._of_geoms(theatre, [self.table[name] for name in own])
+        self._arm, self._world = numbers.arm, numbers.world
+        self._geoms = _numbers_of_geoms(theatre, numbers)
 
     def of(self, things: Iterable[Thing]) -> IntArray:
         """Return the numbers of things, with that of nothing as the last."""
@@ -52,19 +86,18 @@ class Identities:
             return int(self._geoms[thing.number])
         return self._arm if thing.kind in _OF_ARM else self._world
 
-    def _of_geoms(self, theatre: Theatre, numbers: Sequence[int]) -> IntArray:
-        """Return the numbers of the geoms of the model."""
-        model = theatre.model
-        roots, bodies = model.body_rootid, model.geom_bodyid
-        moves = np.zeros(model.nbody, bool)
-        moves[roots[model.dof_bodyid]] = True
-        found = np.where(moves[roots[bodies]], self._arm, self._world)
-        blade, *graspers = numbers[:-2]
-        for number, grasper in zip(graspers, theatre.graspers.values(), strict=True):
-            found[np.isin(bodies, [model.body(name).id for name in grasper.bodies])] = number
-        if theatre.blade is not None:
-            found[_blade_geoms(model, theatre.blade.body_id)] = blade
-        return np.asarray(found, np.int32)
+
+def _numbers_of_geoms(theatre: Theatre, numbers: IdentityTable) -> IntArray:
+    """Return the numbers of the geoms of the model."""
+    model = theatre.model
+    bodies = model.geom_bodyid
+    found = np.where(np.isin(bodies, arm_bodies(model)), numbers.arm, numbers.world)
+    for name, grasper in theatre.graspers.items():
+        own = [model.body(body).id for body in grasper.bodies]
+        found[np.isin(bodies, own)] = numbers.graspers[name]
+    if theatre.blade is not None:
+        found[_blade_geoms(model, theatre.blade.body_id)] = numbers.blade
+    return np.asarray(found, np.int32)
 
 
 def _blade_geoms(model: mujoco.MjModel, body: int) -> list[int]:

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from scalpel_sim.camera.camera import Camera, CameraImage
+from scalpel_sim.camera.camera import CameraImage
 from scalpel_sim.errors import UsageError, writing
 from scalpel_sim.output.export import check_file
 from tissue import IntArray
@@ -100,13 +100,16 @@ def write_segmentation(path: Path, picture: IntArray, ids: Mapping[str, int]) ->
     _write_png(path, image, texts)
 
 
-def write_image(camera: Camera, image: CameraImage, files: Mapping[str, Path]) -> list[str]:
+def write_image(
+    image: CameraImage, files: Mapping[str, Path], *, far: float, ids: Mapping[str, int]
+) -> list[str]:
     """Write what is wanted of an image; return the names of the files.
 
     Args:
-        camera: The camera that took it.
         image: The image.
         files: Files by what they are for: `output`, the colours, `depth` and `segmentation`.
+        far: Depth where nothing is [m].
+        ids: Numbers of the segmentation by name.
 
     Raises:
         RunError: a file cannot be written.
@@ -114,9 +117,9 @@ def write_image(camera: Camera, image: CameraImage, files: Mapping[str, Path]) -
     if "output" in files:
         write_colours(files["output"], image.rgb)
     if "depth" in files:
-        write_depth(files["depth"], image.depth, camera.far)
+        write_depth(files["depth"], image.depth, far)
     if "segmentation" in files:
-        write_segmentation(files["segmentation"], image.segmentation, camera.ids)
+        write_segmentation(files["segmentation"], image.segmentation, ids)
     return [str(path) for path in files.values()]
 
 

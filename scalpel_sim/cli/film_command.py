@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from scalpel_sim.cli.camera_options import CameraOptions, FilmOptions
-from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions, expect_no_options
+from scalpel_sim.cli.options import ArmOptions, SceneName, TissueOptions
 from scalpel_sim.runs.console import log_to_stderr, say
 from scalpel_sim.runs.options import OUTPUT, PrintOptions
 
@@ -45,25 +45,17 @@ def film(
         from scalpel_sim.camera.canvas import PixelSize
         from scalpel_sim.camera.film_files import film_path, open_film
         from scalpel_sim.camera.force_panel import ForcePanel
-        from scalpel_sim.cli.camera_run import scene_of_run
-        from scalpel_sim.cli.film_sources import recorded_source, simulated_source
+        from scalpel_sim.cli.camera_run import CameraRequest
+        from scalpel_sim.cli.film_sources import film_source
 
         pace.check()
         path, told = film_path(output)
-        recording = None if scene is None else _recording(Path(scene))
-        if recording is None:
-            scene = scene_of_run(scene, tissue, arm)
-        else:
-            expect_no_options((tissue, arm), f"the run in {scene}, which is shown as it was")
         if told and not printing.quiet:
             say(told)
         interval = 1.0 / (pace.fps * pace.slow)
         size, panel, n_pictures = PixelSize(camera.width, camera.height), None, 0
-        with (
-            simulated_source(scene, tissue, arm, camera, printing, interval=interval)
-            if recording is None
-            else recorded_source(recording, camera, interval=interval)
-        ) as source:
+        request = CameraRequest(scene, tissue, arm, camera, printing)
+        with film_source(request, interval=interval) as source:
             if pace.plot:
                 panel = ForcePanel(source.graspers, source.seconds, size)
                 size = PixelSize(2 * size.width, size.height)
@@ -72,7 +64,7 @@ def film(
                     file.add(picture)
                     n_pictures += 1
         found = {
-            "scene": source.title,
+            "scene": source.scene,
             "camera": source.camera,
             "file": str(path),
             "pictures": n_pictures,
@@ -87,13 +79,3 @@ def film(
                 f"{path}: {n_pictures} pictures, {n_pictures / pace.fps:.1f} s of film, of "
                 f"{found['scene']}, {found['simulated_s']:.2f} s"
             )
-
-
-def _recording(path: Path) -> Path | None:
-    """Return the recording that a path is, or the only one in a folder; None: there is none."""
-    from scalpel_sim.saved_run.layout import VTKHDF_SUFFIX
-
-    if path.suffix.lower() == VTKHDF_SUFFIX:
-        return path
-    found = sorted(path.glob(f"*{VTKHDF_SUFFIX}")) if path.is_dir() else []
-    return found[0] if len(found) == 1 else None

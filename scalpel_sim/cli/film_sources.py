@@ -3,24 +3,20 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.camera.canvas import PixelSize
 from scalpel_sim.camera.film import film_frames
 from scalpel_sim.camera.force_panel import ForcePanel
-from scalpel_sim.camera.played_camera import PlayedCamera
-from scalpel_sim.camera.viewpoints import usual_camera
-from scalpel_sim.cli.camera_options import CameraOptions
-from scalpel_sim.cli.camera_run import camera_run
-from scalpel_sim.cli.options import ArmOptions, TissueOptions
+from scalpel_sim.cli.camera_run import CameraRequest, PlayedRun, camera_run, played_run
 from scalpel_sim.recording.columns import vector_columns
 from scalpel_sim.runs.console import progress
-from scalpel_sim.runs.options import PrintOptions
 from scalpel_sim.runs.run import run_time
 from scalpel_sim.saved_run.saved_run import SavedRun
+
+_ROUNDING = 1e-9
+"""Share of a picture that is rounding."""
 
 MakePictures = Callable[[ForcePanel | None], Iterator[np.ndarray]]
 
@@ -28,7 +24,7 @@ MakePictures = Callable[[ForcePanel | None], Iterator[np.ndarray]]
 class FilmSource(NamedTuple):
     """A run of which there will be a film."""
 
-    title: str
+    scene: str
     """Name of the scene."""
     seconds: float
     """Time that it lasts, as far as is known [s]."""
@@ -43,94 +39,52 @@ class FilmSource(NamedTuple):
 
 
 @contextmanager
-def simulated_source(
-    scene: str | None,
-    tissue: TissueOptions,
-    arm: ArmOptions,
-    camera: CameraOptions,
-    printing: PrintOptions,
-    *,
-    interval: float,
-) -> Iterator[FilmSource]:
-    """Yield a scene that is simulated as its pictures are made.
+def film_source(request: CameraRequest, *, interval: float) -> Iterator[FilmSource]:
+    """Yield a run that is filmed: a recorded one is played, any other simulated meanwhile.
 
     Args:
-        scene: A scene or a FILE.toml; None for the default one.
-        tissue: What is asked of the tissue.
-        arm: What is asked of the arm.
-        camera: What is asked of the camera.
-        printing: Whether progress is shown.
+        request: What is asked for.
         interval: Simulated time from one picture to the next [s].
     """
-    with camera_run(scene, tissue, arm, camera, printing) as run:
-        ends = partial(run_time, seconds=run.scene.seconds)
-        seconds = ends(run.simulation)
-        with progress(seconds, printing) as advance:
+    if (recording := request.recording) is not None:
+        with played_run(request, recording) as played:
+            yield _played_source(played, interval)
+        return
+    with camera_run(request) as (simulation, scene, camera):
+        ends = partial(run_time, seconds=scene.seconds)
+        seconds = ends(simulation)
+        with progress(seconds, request.printing) as advance:
 
             def pictures(panel: ForcePanel | None) -> Iterator[np.ndarray]:
                 return film_frames(
-                    run.simulation,
-                    run.camera,
-                    ends,
-                    interval=interval,
-                    panel=panel,
-                    every_frame=advance,
+                    simulation, camera, ends, interval=interval, panel=panel, every_frame=advance
                 )
 
-            names = [each.name for each in run.simulation.graspers]
-            title, name, renderer = run.scene.name, run.camera.name, run.camera.renderer
-            yield FilmSource(title, seconds, name, names, pictures, renderer)
+            names = [each.name for each in simulation.graspers]
+            yield FilmSource(scene.name, seconds, camera.name, names, pictures, camera.renderer)
 
 
-@contextmanager
-def recorded_source(path: Path, camera: CameraOptions, *, interval: float) -> Iterator[FilmSource]:
-    """Yield a recorded run that is played: nothing is simulated.
+def _played_source(played: PlayedRun, interval: float) -> FilmSource:
+    """Return a recorded run that is filmed with a picture each `interval` [s]."""
+    run, camera = played
+    first, last = float(run.times[0]), float(run.times[-1])
 
-    Args:
-        path: The recording.
-        camera: What is asked of the camera.
-        interval: Simulated time from one picture to the next [s].
+    def pictures(panel: ForcePanel | None) -> Iterator[np.ndarray]:
+        rows = np.empty((0, 0)) if panel is None else _plotted(run)
+        n_rows = 0
+        for i in range(1 + int((last - first) / interval + _ROUNDING)):
+            now = first + i * interval
+            picture = camera.rgb(run.at(now))
+            if panel is None:
+                yield picture
+                continue
+            while n_rows < len(rows) and rows[n_rows, 0] < now:
+                time, area, *forces = rows[n_rows].tolist()
+                panel.add(time, area, forces)
+                n_rows += 1
+            yield np.hstack([picture, panel.picture()])
 
-    Raises:
-        UsageError: it is no recording, or no such camera is in it.
-    """
-    with SavedRun(path) as run:
-        stage, first = run.stage, run.step(0)
-        labels = {} if first.surface.labels is None else dict(run.label_names)
-        labels |= {each.label: each.title for each in stage.look.labels if labels}
-        played = PlayedCamera(
-            stage.shapes,
-            run.frame,
-            labels,
-            stage.look,
-            shadows=camera.shadows,
-            samples=camera.samples,
-        )
-        name = camera.camera or usual_camera(stage.views)
-        played.aim(name, stage.views, first.surface, first.body_poses)
-        size = PixelSize(camera.width, camera.height)
-
-        def pictures(panel: ForcePanel | None) -> Iterator[np.ndarray]:
-            rows = _plotted(run) if panel is not None else np.empty((0, 0))
-            n_rows = 0
-            for i in range(1 + int(run.times[-1] / interval + _ROUNDING)):
-                step = run.at(i * interval)
-                picture = played.rgb(step.surface, step.body_poses, size)
-                if panel is None:
-                    yield picture
-                    continue
-                while n_rows < len(rows) and rows[n_rows, 0] < i * interval:
-                    time, area, *forces = rows[n_rows].tolist()
-                    panel.add(time, area, forces)
-                    n_rows += 1
-                yield np.hstack([picture, panel.picture()])
-
-        title = run.title.partition(":")[0]
-        try:
-            seconds, renderer = float(run.times[-1]), played.renderer()
-            yield FilmSource(title, seconds, name, run.graspers, pictures, renderer)
-        finally:
-            played.close()
+    return FilmSource(run.scene_name, last, camera.name, run.graspers, pictures, camera.renderer)
 
 
 def _plotted(run: SavedRun) -> np.ndarray:
@@ -141,7 +95,3 @@ def _plotted(run: SavedRun) -> np.ndarray:
         for name in forces
     ]
     return np.stack([run.column("time_s"), run.column("cut_area_m2"), *sizes], axis=1)
-
-
-_ROUNDING = 1e-9
-"""Share of a picture that is rounding."""

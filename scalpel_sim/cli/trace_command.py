@@ -57,13 +57,13 @@ def cut_along_pixels(
     """
     with log_to_stderr(printing):
         from scalpel_sim.camera.pixel_places import pixels_to_points
-        from scalpel_sim.cli.camera_run import camera_run
+        from scalpel_sim.cli.camera_run import CameraRequest, camera_run
         from scalpel_sim.scene.scene import changed
         from scalpel_sim.scene.write import scene_text
         from scalpel_sim.strokes.kind import StrokeTable
 
         pixels = [_place(each) for each in line.pixel]
-        with camera_run(scene, tissue, arm, camera, printing) as run:
+        with camera_run(CameraRequest(scene, tissue, arm, camera, printing)) as run:
             found = pixels_to_points(run.camera, pixels, run.camera.depth()).tolist()
         points = [(x, y, z) for x, y, z in found]
         stroke = StrokeTable(kind="traced", points=points, depth=line.depth)

@@ -39,9 +39,6 @@ class RigidBody(NamedTuple):
     """Whether it is part of the surroundings, such as a table, and not of an arm."""
 
 
-ARM, SURROUNDINGS = "arm", "surroundings"
-
-
 def group_of(body: RigidBody) -> str:
     """Return the name of the node that a body hangs on."""
-    return SURROUNDINGS if body.is_fixed else ARM
+    return "surroundings" if body.is_fixed else "arm"

@@ -114,7 +114,6 @@ class OpenRun:
             self.recorder = RunRecorder(
                 prepared.simulation,
                 prepared.record,
-                prepared.scene if prepared.is_here else None,
                 seconds=seconds,
                 continues=self.outputs.resumption is not None,
             )

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from bridge import TissueFrame
 from scalpel_sim.recording.columns import force_parts
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.viewer.model_shapes import body_poses
+from scalpel_sim.viewer.model_shapes import body_poses, camera_poses, perspective_cameras
 from tissue import Energies, RigidContacts
 
 
@@ -16,7 +16,8 @@ def poses_and_forces(simulation: Simulation) -> dict[str, npt.ArrayLike]:
     The names are those of `layout.step_fields`. What is not known is NaN: before the first frame
     the parts of the force, and without an audit the energies.
     """
-    result, blade = simulation.bridge.result, simulation.arm.blade.segment()
+    arm, result = simulation.arm, simulation.bridge.result
+    blade = arm.blade.segment()
     parts = np.full(9, np.nan)
     energies = None
     if result is not None:
@@ -26,10 +27,11 @@ def poses_and_forces(simulation: Simulation) -> dict[str, npt.ArrayLike]:
     return {
         "steps/wrench": simulation.wrench.numbers,
         "steps/blade": blade.numbers,
-        "steps/poses": body_poses(simulation.arm.data),
+        "steps/poses": body_poses(arm.data),
         "steps/cut_area": 0.0 if result is None else result.cut_area,
         "steps/force_parts": parts,
         "steps/energies": np.full(len(Energies._fields), np.nan) if energies is None else energies,
+        "steps/cameras": camera_poses(arm.data, perspective_cameras(arm.model)),
         "steps/hand_forces": [each.wrench.force for each in simulation.graspers],
     }
 

@@ -108,12 +108,13 @@ CONTACTS = Field("contacts", "f8", (6,))
 """Points at which the tissue acts on the blade [m] and the forces on it there [N], world frame."""
 
 
-def step_fields(n_bodies: int, n_hands: int) -> tuple[Field, ...]:
+def step_fields(n_bodies: int, n_hands: int, n_cameras: int) -> tuple[Field, ...]:
     """Return what each step has besides the body: see `docs/recordings.md`.
 
     Args:
         n_bodies: Bodies of the arm's model.
         n_hands: Graspers.
+        n_cameras: Cameras of the arm's model.
     """
     return (
         Field("steps/frame", "i8"),
@@ -124,6 +125,7 @@ def step_fields(n_bodies: int, n_hands: int) -> tuple[Field, ...]:
         Field("steps/force_parts", "f8", (9,)),
         Field("steps/energies", "f8", (len(Energies._fields),)),
         *([Field("steps/hand_forces", "f8", (n_hands, 3))] if n_hands else []),
+        *([Field("steps/cameras", "f8", (n_cameras, 7))] if n_cameras else []),
         *(Field(f"steps/{each.name}", "i8", (2,)) for each in (*SURFACE_FIELDS, CONTACTS)),
         Field("steps/rows", "i8"),
     )
@@ -149,6 +151,8 @@ class Sizes(NamedTuple):
     """Bodies of the arm's model."""
     n_hands: int
     """Graspers."""
+    n_cameras: int
+    """Cameras of the arm's model."""
     n_columns: int
     """Columns of `forces.csv`."""
     rows_per_step: int
@@ -162,7 +166,7 @@ GROWTH = 2
 def tables_of(sizes: Sizes) -> tuple[GrowingTable, ...]:
     """Return the tables of a run, with room for what is expected of it."""
     n, points, cells = sizes.n_steps, GROWTH * sizes.n_points, GROWTH * sizes.n_cells
-    own = step_fields(sizes.n_bodies, sizes.n_hands)
+    own = step_fields(sizes.n_bodies, sizes.n_hands, sizes.n_cameras)
     fields = [("PointData", each, points) for each in POINT_FIELDS]
     fields += [("CellData", each, cells) for each in CELL_FIELDS]
     found = [

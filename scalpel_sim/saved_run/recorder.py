@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import numpy.typing as npt
 
+from bridge import InProcessLink
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.saved_run.body_writer import BodyWriter
 from scalpel_sim.saved_run.growing_tables import GrowingTables
@@ -29,10 +30,10 @@ from scalpel_sim.saved_run.layout import (
     tables_of,
 )
 from scalpel_sim.saved_run.stage import rows_of, stage_of
-from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.write import scene_text
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.version import version
+from scalpel_sim.viewer.model_shapes import perspective_cameras
 
 if TYPE_CHECKING:
     import h5py
@@ -54,14 +55,13 @@ class RunRecorder:
     file has all steps before. Where the simulation goes back, so does the recording.
 
     ```python
-    with RunRecorder(simulation, "run.vtkhdf", scene):
+    with RunRecorder(simulation, "run.vtkhdf"):
         simulation.run(2.0)
     ```
 
     Args:
         simulation: Where the recording begins.
         path: The file, whose name ends in `.vtkhdf`.
-        scene: Scene that the simulation was made from, which is written too; None: it is not known.
         seconds: Length that is expected [s]; None: none is.
         continues: Whether the steps of the file stay that are there, as far as the simulation is.
 
@@ -74,7 +74,6 @@ class RunRecorder:
         self,
         simulation: Simulation,
         path: str | Path,
-        scene: Scene | None = None,
         *,
         seconds: float | None = None,
         continues: bool = False,
@@ -83,8 +82,11 @@ class RunRecorder:
         if self.path.suffix.lower() != VTKHDF_SUFFIX:
             raise UsageError(f"{path}: the name of a recording must end in {VTKHDF_SUFFIX}")
         self._simulation = simulation
-        self._stage = stage_of(simulation, scene).to_bytes()
+        self._stage = stage_of(simulation).to_bytes()
         self._title = simulation.title
+        # Of a tissue elsewhere nobody says how it is held or solved.
+        is_here = isinstance(simulation.link, InProcessLink)
+        scene = simulation.scene if is_here else None
         self._scene_text = None if scene is None else scene_text(scene, self.path)
         self._every = max(1, round(1.0 / (STEPS_PER_SECOND * simulation.dt)))
         self._tables = tables_of(self._sizes(USUAL_SECONDS if seconds is None else seconds))
@@ -111,6 +113,7 @@ class RunRecorder:
             body.n_tetrahedra,
             int(simulation.arm.model.nbody),
             len(simulation.graspers),
+            len(perspective_cameras(simulation.arm.model)),
             len(simulation.recording.columns),
             self._every,
         )

@@ -4,7 +4,7 @@ import json
 import tomllib
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -39,9 +39,6 @@ from tissue import (
     Surface,
     Wrench,
 )
-
-if TYPE_CHECKING:
-    pass
 
 _ROUNDING = 1e-9
 """Difference of times that are the same [s]."""
@@ -151,6 +148,11 @@ class SavedRun:
                 f"in another form ({error}), so that they cannot be drawn; all else can be read"
             ) from error
 
+    @property
+    def scene_name(self) -> str:
+        """Name of the scene."""
+        return self.title.partition(":")[0]
+
     @cached_property
     def scene(self) -> Scene | None:
         """The scene; None: it is not known.
@@ -161,9 +163,7 @@ class SavedRun:
         if self.scene_text is None:
             return None
         content = tomllib.loads(self.scene_text)
-        return scene_in(
-            SceneFile(content, self.title.partition(":")[0], self.path.parent, str(self.path))
-        )
+        return scene_in(SceneFile(content, self.scene_name, self.path.parent, str(self.path)))
 
     @property
     def rows(self) -> FloatArray:
@@ -218,6 +218,8 @@ class SavedRun:
         )
         energies = self._own("steps/energies", i)
         hands = self._own("steps/hand_forces", i) if self.graspers else np.empty((0, 3))
+        has_cameras = f"{OWN}/steps/cameras" in self._file
+        cameras = self._own("steps/cameras", i) if has_cameras else np.empty((0, 7))
         contacts = self._span("contacts", i)
         return SavedStep(
             number=i,
@@ -234,6 +236,7 @@ class SavedRun:
             wrench=Wrench(*wrench),
             blade=BladeSegment(*blade),
             body_poses=self._own("steps/poses", i),
+            camera_poses=cameras,
             cut_area=float(self._own("steps/cut_area", i)),
             force_parts=self._own("steps/force_parts", i).reshape(3, 3),
             energies=None if np.isnan(energies).any() else Energies(*energies.tolist()),

@@ -39,6 +39,9 @@ class SavedStep(NamedTuple):
     body_poses: FloatArray
     """Position [m] and quaternion (w, x, y, z) of the bodies of the arm's model, world frame, shape
     (n_bodies, 7)."""
+    camera_poses: FloatArray
+    """The same of the cameras of the model, which look along their -z: see `Stage.cameras`; shape
+    (n_cameras, 7)."""
     cut_area: float
     """Area cut since the start [m2]."""
     force_parts: FloatArray

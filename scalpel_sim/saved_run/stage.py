@@ -4,18 +4,23 @@ The records have names and fields of their own, by which they are written: a fil
 where a class of the viewer gets another field.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
 import msgspec
 
 from bridge import TissueFrame
 from scalpel_sim.scene.label_colours import LabelColours
-from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look, Ramp, look_of_scene
-from scalpel_sim.viewer.model_shapes import Shape, shapes_of
+from scalpel_sim.viewer.model_shapes import (
+    ModelCamera,
+    Shape,
+    arm_bodies,
+    perspective_cameras,
+    shapes_of,
+)
 from scalpel_sim.viewer.packing import pack, unpack
 from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import FloatArray, IntArray
@@ -74,11 +79,22 @@ class _ShapeRecord(msgspec.Struct):
         )
 
 
+class _CameraRecord(msgspec.Struct):
+    """A camera of the arm's model; see `ModelCamera`."""
+
+    name: str
+    number: int
+    fov_degrees: float
+
+
 class _StageRecord(msgspec.Struct):
-    """Shapes, cameras and the look of the body; see `Look`."""
+    """Shapes, cameras and the look of the body; see `Stage` and `Look`."""
 
     shapes: list[_ShapeRecord]
     views: list[ViewTable]
+    cameras: list[_CameraRecord]
+    arm_bodies: list[int]
+    graspers: dict[str, list[int]]
     skin: Ramp
     inside: Ramp
     vessels: float
@@ -97,6 +113,12 @@ class Stage(NamedTuple):
     """Visible shapes of the arm's model."""
     views: Sequence[ViewTable] = ()
     """Cameras of the scene."""
+    cameras: Sequence[ModelCamera] = ()
+    """Cameras of the arm's model."""
+    arm_bodies: Sequence[int] = ()
+    """Numbers of the bodies of arms; the others are part of the world."""
+    graspers: Mapping[str, Sequence[int]] = {}
+    """Of each grasper its bodies."""
     look: Look = ORGAN_LOOK
     """Look of the body's material."""
 
@@ -107,6 +129,9 @@ class Stage(NamedTuple):
             _StageRecord(
                 [_ShapeRecord.of(shape) for shape in self.shapes],
                 list(self.views),
+                [_CameraRecord(*each) for each in self.cameras],
+                list(self.arm_bodies),
+                {name: list(bodies) for name, bodies in self.graspers.items()},
                 look.skin,
                 look.inside,
                 look.vessels,
@@ -138,18 +163,30 @@ class Stage(NamedTuple):
             glow=record.glow,
             labels=record.labels,
         )
-        return cls([each.shape() for each in record.shapes], record.views, look)
+        return cls(
+            [each.shape() for each in record.shapes],
+            record.views,
+            [ModelCamera(each.name, each.number, each.fov_degrees) for each in record.cameras],
+            record.arm_bodies,
+            record.graspers,
+            look,
+        )
 
 
-def stage_of(simulation: Simulation, scene: Scene | None) -> Stage:
-    """Return the stage of a simulation.
-
-    Args:
-        simulation: The simulation.
-        scene: Scene that it was made from; None: it is not known.
-    """
-    shapes = list(shapes_of(simulation.arm.model))
-    return Stage(shapes) if scene is None else Stage(shapes, scene.views, look_of_scene(scene))
+def stage_of(simulation: Simulation) -> Stage:
+    """Return the stage of a simulation."""
+    model, scene = simulation.arm.model, simulation.scene
+    return Stage(
+        list(shapes_of(model)),
+        () if scene is None else scene.views,
+        perspective_cameras(model),
+        arm_bodies(model).tolist(),
+        {
+            each.name: [model.body(name).id for name in each.grasper.bodies]
+            for each in simulation.graspers
+        },
+        ORGAN_LOOK if scene is None else look_of_scene(scene),
+    )
 
 
 def frame_from(rows: FloatArray) -> TissueFrame:

@@ -1,6 +1,6 @@
 """The visible shapes of a MuJoCo model as triangle meshes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -10,7 +10,7 @@ from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.arm.standing import TABLETOP
 from scalpel_sim.viewer import primitives
 from scalpel_sim.viewer.primitives import TriangleMesh, blade, edge_in_geom
-from tissue import FloatArray
+from tissue import FloatArray, IntArray
 
 LAST_VISIBLE_GROUP = 2
 """Last geom group that is drawn. MuJoCo's viewer shows the groups 0, 1 and 2 too; the others hold,
@@ -95,9 +95,46 @@ def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
             )
 
 
+def arm_bodies(model: mujoco.MjModel) -> IntArray:
+    """Return the numbers of the bodies of arms: of all that hang on the world by a joint."""
+    roots = model.body_rootid
+    return np.flatnonzero(np.isin(roots, roots[model.dof_bodyid]))
+
+
 def body_poses(data: mujoco.MjData) -> FloatArray:
     """Return position [m] and quaternion (w, x, y, z) of all bodies, shape (n_bodies, 7)."""
     return np.hstack([data.xpos, data.xquat])
+
+
+class ModelCamera(NamedTuple):
+    """A camera of a model."""
+
+    name: str
+    """Its name."""
+    number: int
+    """Its number."""
+    fov_degrees: float
+    """Angle from the lower to the upper side of its picture [degree]."""
+
+
+def perspective_cameras(model: mujoco.MjModel) -> list[ModelCamera]:
+    """Return the cameras of a model that have a name, and a lens that an angle describes.
+
+    Those that have a sensor and a focal length, or no perspective, are left out.
+    """
+    perspective = int(mujoco.mjtProjection.mjPROJ_PERSPECTIVE)
+    is_plain = (model.cam_projection == perspective) & ~model.cam_sensorsize.any(axis=1)
+    cameras = (model.camera(i) for i in np.flatnonzero(is_plain))
+    return [ModelCamera(c.name, c.id, float(c.fovy[0])) for c in cameras if c.name]
+
+
+def camera_poses(data: mujoco.MjData, cameras: Sequence[ModelCamera]) -> FloatArray:
+    """Return position [m] and quaternion (w, x, y, z) of cameras, shape (n_cameras, 7)."""
+    poses = np.empty((len(cameras), 7))
+    for pose, camera in zip(poses, cameras, strict=True):
+        pose[:3] = data.cam_xpos[camera.number]
+        mujoco.mju_mat2Quat(pose[3:], data.cam_xmat[camera.number])
+    return poses
 
 
 def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -104,7 +104,7 @@ def test_a_run_that_nobody_begins_leaves_no_recording(tmp_path):
 def test_a_recording_goes_back_with_its_simulation(whole, tmp_path):
     path, simulation = tmp_path / "run.vtkhdf", prepare(GRID)
     n_nodes = simulation.link.describe().n_nodes
-    with RunRecorder(simulation, path, GRID, seconds=0.1):  # less than comes: it finds room
+    with RunRecorder(simulation, path, seconds=0.1):  # less than comes: it finds room
         simulation.run(0.59)
         assert simulation.link.describe().n_nodes > n_nodes
         simulation.reset()

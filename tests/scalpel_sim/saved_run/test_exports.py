@@ -28,7 +28,7 @@ ROUNDING = 1e-6
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     path, simulation = tmp_path_factory.mktemp("recorded") / "run.vtkhdf", prepare(LAYERS)
-    with RunRecorder(simulation, path, LAYERS, seconds=0.2):
+    with RunRecorder(simulation, path, seconds=0.2):
         simulation.run(0.2)
     return path
 

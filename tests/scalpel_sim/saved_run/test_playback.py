@@ -21,7 +21,7 @@ LAYERS = changed(SCENES["layers"], seconds=0.2)
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     path, simulation = tmp_path_factory.mktemp("recorded") / "run.vtkhdf", prepare(LAYERS)
-    with RunRecorder(simulation, path, LAYERS, seconds=0.2):
+    with RunRecorder(simulation, path, seconds=0.2):
         simulation.run(0.2)
     return path
 

@@ -54,7 +54,7 @@ def recorded(tmp_path_factory):
         if now.n_frames % 40 == 0:
             truths.append(truth_of(now))
 
-    with RunRecorder(simulation, path, scene, seconds=SECONDS):
+    with RunRecorder(simulation, path, seconds=SECONDS):
         simulation.run(SECONDS, keep)
     truths.append(truth_of(simulation))
     return path, truths, simulation
