@@ -167,7 +167,8 @@ class Canvas:
         with self._as_numbers():
             colours, metres = self._drawn(size, colours=True, depth=depth)
         things = self._composition.things()
-        return colours.astype(np.int64) @ np.array([1, 256, 65536]) - 1, things, metres
+        red, green, blue = (colours[:, :, i].astype(np.int32) for i in range(3))
+        return (red | green << 8 | blue << 16) - 1, things, metres
 
     @contextmanager
     def _as_numbers(self) -> Iterator[None]:

@@ -82,6 +82,8 @@ class Composition:
         self._instead: dict[int, str] = {}
         self._render: RenderModel | None = None
         self._corners: dict[str, _Corners] = {}
+        self._camera = mujoco.MjvCamera()
+        self._aimed_at: Viewpoint | int | None = None
         self.scene = mujoco.MjvScene()
         """The scene as `look` has composed it."""
         self.n_models = 0
@@ -125,6 +127,7 @@ class Composition:
                 for name in self._rooms
             }
             self._written.clear()
+            self._aimed_at = None
             self.n_models += 1
         return self._render
 
@@ -139,18 +142,20 @@ class Composition:
             data: Data of the model.
             option: What is drawn of the model.
         """
-        render, camera = self.with_room(), mujoco.MjvCamera()
-        if isinstance(view, Viewpoint):
-            camera.type = mujoco.mjtCamera.mjCAMERA_USER
-            aim(self.scene, view, far)
-        else:
+        render, camera, scene = self.with_room(), self._camera, self.scene
+        if not isinstance(view, Viewpoint):
             camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, view
+        elif view is not self._aimed_at:
+            camera.type = mujoco.mjtCamera.mjCAMERA_USER
+            aim(scene, view, far)
+        self._aimed_at = view
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
-        mujoco.mjv_updateScene(self._model, data, option, None, camera, every, self.scene)
-        widen_range(self.scene)
+        mujoco.mjv_updateScene(self._model, data, option, None, camera, every, scene)
+        if not isinstance(view, Viewpoint):
+            widen_range(scene)
         self._replace_geoms(render)
         self._append_meshes(render)
-        self.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._shadows
+        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._shadows
 
     def things(self) -> list[Thing]:
         """Return what is in the scene, in the order of the numbers by which it is drawn."""

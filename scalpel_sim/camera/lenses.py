@@ -18,25 +18,25 @@ of it, so that it begins at 2 / sqrt(3): beyond all else in the depth of an imag
 
 
 def aim(scene: mujoco.MjvScene, view: Viewpoint, far: float) -> None:
-    """Aim both eyes of a scene.
+    """Aim both eyes of a scene, which see from `NEAREST` to the sky behind all else.
 
     Args:
         scene: The scene.
         view: Where from.
-        far: Distance beyond which nothing is drawn [m].
+        far: Distance beyond which nothing but the sky is drawn [m].
     """
     forward, up = view.axes
     half = NEAREST * float(np.tan(np.radians(0.5 * view.fov_degrees)))
     for lens in scene.camera:
         lens.pos, lens.forward, lens.up = view.eye, forward, up
-        lens.frustum_near, lens.frustum_far = NEAREST, far
+        lens.frustum_near, lens.frustum_far = NEAREST, _SKY * far
         lens.frustum_bottom, lens.frustum_top = -half, half
         lens.frustum_center = lens.frustum_width = 0.0
         lens.orthographic = False
 
 
 def widen_range(scene: mujoco.MjvScene) -> None:
-    """Make a scene show what is as near to its eyes as `NEAREST`, and the sky behind all else."""
+    """Make the eyes of a camera of a model see from `NEAREST` to the sky behind all else."""
     for lens in scene.camera:
         lens.frustum_far *= _SKY
         share = NEAREST / lens.frustum_near

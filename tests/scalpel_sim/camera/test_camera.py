@@ -197,6 +197,9 @@ def test_a_further_camera_sees_the_same_instant():
     assert (second.rgb() == alone.rgb()).all() and second.rgb().shape == (32, 96, 3)
     theatre.tissue.step(None, 0.01)
     assert (second.depth() == alone.depth()).all()
+    before = second.rgb()
+    first.another("side").rgb()  # of the model, which aims it by itself
+    assert (second.rgb() == before).all()
 
 
 def test_samples_smooth_edges_and_leave_the_numbers_alone():
