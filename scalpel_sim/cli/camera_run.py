@@ -35,12 +35,17 @@ class CameraRequest(NamedTuple):
     printing: PrintOptions
 
     @property
+    def is_folder(self) -> bool:
+        """Whether it is the folder of a run."""
+        return self.name is not None and Path(self.name).is_dir()
+
+    @property
     def recording(self) -> Path | None:
         """The recording that is named, or the only one in the folder; None: there is none."""
         path = Path(self.name or "")
         if path.suffix.lower() == VTKHDF_SUFFIX:
             return path
-        found = sorted(path.glob(f"*{VTKHDF_SUFFIX}")) if self.name and path.is_dir() else []
+        found = sorted(path.glob(f"*{VTKHDF_SUFFIX}")) if self.is_folder else []
         return found[0] if len(found) == 1 else None
 
     @property
@@ -50,7 +55,7 @@ class CameraRequest(NamedTuple):
         Raises:
             UsageError: the folder has no scene, or its run is to be changed.
         """
-        if self.name is None or not Path(self.name).is_dir():
+        if self.name is None or not self.is_folder:
             return self.name
         self.expect_no_change()
         if not (Path(self.name) / SCENE).is_file():

@@ -27,7 +27,7 @@ def film(
 
     MP4 and WebM are written by the ffmpeg on the PATH; where there is none, an animated PNG takes
     their place. A run with a recording (`run --record`) is played, any other is done again from its
-    folder, which gives the same bits.
+    folder, which gives the same bits; so is a film of a folder in slow motion.
 
     For example:
 

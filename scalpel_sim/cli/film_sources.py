@@ -11,8 +11,9 @@ from scalpel_sim.camera.film import film_frames
 from scalpel_sim.camera.force_panel import ForcePanel
 from scalpel_sim.cli.camera_run import CameraRequest, PlayedRun, camera_run, played_run
 from scalpel_sim.recording.columns import vector_columns
-from scalpel_sim.runs.console import progress
+from scalpel_sim.runs.console import progress, say
 from scalpel_sim.runs.run import run_time
+from scalpel_sim.saved_run.recorder import STEPS_PER_SECOND
 from scalpel_sim.saved_run.saved_run import SavedRun
 
 _ROUNDING = 1e-9
@@ -42,11 +43,21 @@ class FilmSource(NamedTuple):
 def film_source(request: CameraRequest, *, interval: float) -> Iterator[FilmSource]:
     """Yield a run that is filmed: a recorded one is played, any other simulated meanwhile.
 
+    The run in a folder is simulated too, where pictures follow one another faster than steps of its
+    recording.
+
     Args:
         request: What is asked for.
         interval: Simulated time from one picture to the next [s].
     """
-    if (recording := request.recording) is not None:
+    recording, is_slow = request.recording, interval < (1.0 - _ROUNDING) / STEPS_PER_SECOND
+    if recording is not None and not (is_slow and request.is_folder):
+        if is_slow and not request.printing.quiet:
+            say(
+                f"{recording} has {STEPS_PER_SECOND:g} steps a second, fewer than this film has "
+                "pictures: several of them are the same. A film of the scene, or of the folder of "
+                "the run, has none twice"
+            )
         with played_run(request, recording) as played:
             yield _played_source(played, interval)
         return

@@ -110,6 +110,23 @@ def test_a_recorded_run_is_played_without_simulating(tmp_path, monkeypatch, caps
             assert np.median(np.abs(pictures[0][:, :64] - pictures[1])) <= 2
 
 
+@needs_renderer
+def test_in_slow_motion_a_folder_is_simulated_and_a_recording_repeats_its_steps(tmp_path, capsys):
+    out = tmp_path / "out"
+    recording = out / "run.vtkhdf"
+    out.mkdir()
+    asked = ["run", "slab", "--seconds", "0.08", "--quiet", "--out", str(out)]
+    assert command_line([*asked, "--record", str(recording)]) == EXIT_OK
+    n_seen = []
+    for of, film in ((out, tmp_path / "a.png"), (recording, tmp_path / "b.png")):
+        assert command_line(["film", str(of), *SMALL, "--slow", "5", "-o", str(film)]) == EXIT_OK
+        assert ("several of them are the same" in capsys.readouterr().err) == (of == recording)
+        with Image.open(film) as picture:
+            frames = [frame.convert("RGB").tobytes() for frame in ImageSequence.Iterator(picture)]
+        n_seen.append(len(set(frames)))
+    assert n_seen[1] == 3 < n_seen[0]
+
+
 def gradients() -> list[np.ndarray]:
     """Return pictures of an odd size whose colours go by."""
     y, x = np.mgrid[0:49, 0:65]
