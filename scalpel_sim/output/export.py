@@ -25,22 +25,21 @@ import numpy as np
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.errors import UsageError, writing
 from scalpel_sim.output.rigid_bodies import (
-    STEEL_ROUGHNESS,
+    ROUGHNESS,
     RigidBody,
     RigidPart,
     group_of,
 )
 from scalpel_sim.output.surface_pieces import piece_of_vertices, surface_pieces
 from scalpel_sim.output.usd import (
-    ROUGHNESS,
     USD_ENDINGS,
     UsdMesh,
     UsdNode,
     expect_usd,
     usd_bytes,
 )
-from scalpel_sim.scene.label_colours import LabelColours
-from tissue import CUT_COLOUR, SKIN_COLOUR, BoolArray, FloatArray, Surface
+from scalpel_sim.scene.label_colours import TissueColours
+from tissue import BoolArray, FloatArray, Surface
 from tissue.support import whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
@@ -58,8 +57,8 @@ class _Exported(NamedTuple):
 
     surface: Surface
     """Surface of the body."""
-    labels: Sequence[LabelColours]
-    """Colours of its labels, if it has several."""
+    colours: TissueColours
+    """Its colours."""
     beside: Sequence[RigidBody]
     """Arm and surroundings."""
 
@@ -78,7 +77,7 @@ class _Part(NamedTuple):
 def export_surface(
     surface: Surface,
     path: Path,
-    labels: Sequence[LabelColours] = (),
+    colours: TissueColours = TissueColours(),
     *,
     beside: Sequence[RigidBody] = (),
     option: str = "--export",
@@ -88,7 +87,7 @@ def export_surface(
     Args:
         surface: The surface.
         path: The file.
-        labels: Colours of the labels of the body, if it has several.
+        colours: Colours of the body.
         beside: Arm and surroundings, which GLB and USD have.
         option: The option that chose the file, for messages.
 
@@ -99,7 +98,7 @@ def export_surface(
     _check_suffix(path, ENDINGS, option)
     write = _WRITERS[path.suffix.lower()]
     with writing(path, f"another {option}"), whole_file(path) as unfinished:
-        unfinished.write_bytes(write(_Exported(surface, labels, beside)))
+        unfinished.write_bytes(write(_Exported(surface, colours, beside)))
 
 
 def check_exports(
@@ -154,17 +153,17 @@ def _stl(given: _Exported) -> bytes:
 
 def _ply(given: _Exported) -> bytes:
     """Return the surface as binary PLY with a colour, `is_cut` and `piece` for each face."""
-    surface, labels, _ = given
+    surface, colours, _ = given
     mesh = surface.to_trimesh()
     piece = piece_of_vertices(surface)[surface.triangles[:, 0]] + 1
     mesh.face_attributes["piece"] = piece.astype(np.int32)
-    if labels and surface.labels is not None:
+    if colours.labels and surface.labels is not None:
         mesh.face_attributes["label"] = surface.labels.astype(np.int32)
-        colours = np.zeros((len(surface.triangles), 4), np.uint8)
-        for part in _parts(surface, labels):
-            colours[part.chosen] = part.colour
-        visual: Any = mesh.visual
-        visual.face_colors = colours
+    of_faces = np.zeros((len(surface.triangles), 4), np.uint8)
+    for part in _parts(surface, colours):
+        of_faces[part.chosen] = part.colour
+    visual: Any = mesh.visual
+    visual.face_colors = of_faces
     return _exported(mesh, "ply")
 
 
@@ -178,7 +177,7 @@ def _obj(given: _Exported) -> bytes:
     for name, piece in surface_pieces(given.surface):
         lines.append(f"o {name}")
         lines += (f"v {x!r} {y!r} {z!r}" for x, y, z in piece.positions.tolist())
-        for part in _parts(piece, given.labels):
+        for part in _parts(piece, given.colours):
             lines.append(f"g {name}_{part.name}")
             corners = (piece.triangles[part.chosen] + n_before).tolist()
             lines += (f"f {a} {b} {c}" for a, b, c in corners)
@@ -195,7 +194,7 @@ def _glb(given: _Exported) -> bytes:
     graph.update("body", "world", matrix=_Y_UP)
     for name, piece in surface_pieces(given.surface):
         graph.update(name, "body")
-        for part in _parts(piece, given.labels):
+        for part in _parts(piece, given.colours):
             scene.add_geometry(
                 _part_mesh(piece, part),
                 node_name=f"{name}_{part.name}",
@@ -229,7 +228,7 @@ def _usd(ending: str, given: _Exported) -> bytes:
     tissue = root.child("body")
     for name, piece in surface_pieces(given.surface):
         above = tissue.child(name)
-        for part in _parts(piece, given.labels):
+        for part in _parts(piece, given.colours):
             own = piece.part(part.chosen)
             used, corners = np.unique(own.triangles, return_inverse=True)
             above.child(
@@ -250,7 +249,7 @@ def _usd(ending: str, given: _Exported) -> bytes:
                     rigid.triangles,
                     _linear(rigid.colour),
                     rigid.normals,
-                    *((STEEL_ROUGHNESS, 1.0) if rigid.is_steel else (ROUGHNESS, 0.0)),
+                    rigid.roughness,
                 ),
             )
     return usd_bytes(root, ending)
@@ -263,24 +262,29 @@ def _linear(colour: tuple[int, ...]) -> FloatArray:
     return linear
 
 
-def _parts(piece: Surface, labels: Sequence[LabelColours]) -> Iterator[_Part]:
+def _parts(piece: Surface, colours: TissueColours) -> Iterator[_Part]:
     """Yield the parts that a piece has: skin and cut faces, those of each label by themselves."""
     for name, chosen, colour in (
-        ("skin", ~piece.is_cut, SKIN_COLOUR),
-        ("cut", piece.is_cut, CUT_COLOUR),
+        ("skin", ~piece.is_cut, colours.skin),
+        ("cut", piece.is_cut, colours.inside),
     ):
-        if piece.labels is None or not labels:
-            parts = [_Part(name, chosen, colour)]
+        if piece.labels is None or not colours.labels:
+            parts = [_Part(name, chosen, _opaque(colour))]
         else:
             parts = [
                 _Part(
                     f"{name}_{each.label}_{re.sub(r'[^A-Za-z0-9]+', '_', each.title)}",
                     chosen & (piece.labels == each.label),
-                    (*bytes.fromhex(each.inside if name == "cut" else each.skin), colour[3]),
+                    _opaque(each.inside if name == "cut" else each.skin),
                 )
-                for each in labels
+                for each in colours.labels
             ]
         yield from (part for part in parts if part.chosen.any())
+
+
+def _opaque(colour: str) -> tuple[int, ...]:
+    """Return red, green, blue and opacity, 0 to 255, of six hexadecimal digits."""
+    return (*bytes.fromhex(colour), 255)
 
 
 def _part_mesh(piece: Surface, part: _Part) -> "Trimesh":
@@ -295,10 +299,10 @@ def _rigid_mesh(part: RigidPart) -> "Trimesh":
     from trimesh import Trimesh
 
     mesh = Trimesh(part.positions, part.triangles, vertex_normals=part.normals, process=False)
-    return _painted(mesh, part.colour, is_steel=part.is_steel)
+    return _painted(mesh, part.colour, part.roughness)
 
 
-def _painted(mesh: "Trimesh", colour: tuple[int, ...], *, is_steel: bool = False) -> "Trimesh":
+def _painted(mesh: "Trimesh", colour: tuple[int, ...], roughness: float = ROUGHNESS) -> "Trimesh":
     """Return a mesh with a material of its own."""
     from trimesh.visual import material, texture
 
@@ -307,8 +311,8 @@ def _painted(mesh: "Trimesh", colour: tuple[int, ...], *, is_steel: bool = False
     mesh.visual = visuals(
         material=pbr(
             baseColorFactor=_linear(colour),
-            roughnessFactor=STEEL_ROUGHNESS if is_steel else ROUGHNESS,
-            metallicFactor=float(is_steel),
+            roughnessFactor=roughness,
+            metallicFactor=0.0,
         )
     )
     return mesh

@@ -5,8 +5,12 @@ from typing import NamedTuple
 
 from tissue import FloatArray, IntArray
 
+ROUGHNESS = 0.5
+"""Roughness of tissue and arms, from 0, a mirror, to 1."""
+
 STEEL_ROUGHNESS = 0.25
-"""Roughness of polished steel, from 0, a mirror, to 1."""
+"""Roughness of the blade and of the pads of graspers. They are not metal: that would be black where
+there is no room to reflect."""
 
 
 class RigidPart(NamedTuple):
@@ -22,8 +26,8 @@ class RigidPart(NamedTuple):
     """Unit normals of the vertices, frame of the body, shape (n_vertices, 3)."""
     colour: tuple[int, ...]
     """Red, green, blue and opacity, 0 to 255 (sRGB)."""
-    is_steel: bool
-    """Whether it is polished metal."""
+    roughness: float = ROUGHNESS
+    """From 0, a mirror, to 1."""
 
 
 class RigidBody(NamedTuple):

@@ -9,13 +9,11 @@ import numpy as np
 
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.errors import UsageError
+from scalpel_sim.output.rigid_bodies import ROUGHNESS
 from tissue import FloatArray, IntArray
 
 USD_ENDINGS = (".usd", ".usda", ".usdc")
 """Endings of names: USD's usual form, which is binary; text; binary."""
-
-ROUGHNESS = 0.5
-"""Roughness of tissue and arms, from 0, a mirror, to 1."""
 
 
 class UsdMesh(NamedTuple):
@@ -31,8 +29,6 @@ class UsdMesh(NamedTuple):
     """Unit normals of the vertices, shape (n_vertices, 3); None: those of the triangles."""
     roughness: float = ROUGHNESS
     """From 0, a mirror, to 1."""
-    metallic: float = 0.0
-    """1 of metal, else 0."""
 
 
 class UsdNode:
@@ -140,7 +136,6 @@ def _add_mesh(stage: Any, path: str, given: UsdMesh) -> None:
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(colour)
     for name, value in (
         ("roughness", given.roughness),
-        ("metallic", given.metallic),
         ("opacity", opacity),
     ):
         shader.CreateInput(name, Sdf.ValueTypeNames.Float).Set(value)

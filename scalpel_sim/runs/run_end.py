@@ -28,11 +28,12 @@ from scalpel_sim.runs.run_folder import Outputs
 from scalpel_sim.runs.run_pictures import pictures_of
 from scalpel_sim.runs.run_report import report_of
 from scalpel_sim.saved_run.recorder import RunRecorder
-from scalpel_sim.scene.label_colours import colours_of_scene
 from scalpel_sim.strokes.grasp_motion import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
+from scalpel_sim.viewer.looks import look_of_scene
 from scalpel_sim.viewer.pictures import add_to
 from scalpel_sim.viewer.replay import ReplayWriter
+from scalpel_sim.viewer.textures import even_colours
 from tissue import Deformation, Snapshot
 
 _log = logging.getLogger(__name__)
@@ -159,8 +160,8 @@ def write_end(run: OpenRun) -> Summary:
         outputs.write_report(report_of(run.prepared, summary, warnings, run.hand, pictures))
     for path in run.prepared.exports:
         with attempts.of(str(path)):
-            labels = colours_of_scene(run.prepared.scene)
-            export_surface(simulation.link.surface(), path, labels)
+            colours = even_colours(look_of_scene(run.prepared.scene))
+            export_surface(simulation.link.surface(), path, colours)
     with attempts.of(PLOT):
         outputs.finish_plots()
     return summary

@@ -9,10 +9,11 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.errors import UsageError, writing
 from scalpel_sim.output.export import ENDINGS, check_exports, export_surface
-from scalpel_sim.output.rigid_bodies import RigidBody, RigidPart
+from scalpel_sim.output.rigid_bodies import ROUGHNESS, STEEL_ROUGHNESS, RigidBody, RigidPart
 from scalpel_sim.saved_run.saved_run import SavedRun
 from scalpel_sim.saved_run.saved_step import SavedStep
 from scalpel_sim.viewer.model_shapes import Shape, position_and_rotation
+from scalpel_sim.viewer.textures import even_colours
 from tissue import FloatArray, write_vtu
 from tissue.support import whole_file
 
@@ -49,8 +50,8 @@ def export_step(run: SavedRun, time: float | None, path: Path) -> SavedStep:
         with writing(path, f"another {_OUT}"):
             _write_body(run, step, path)
     else:
-        labels, beside = run.stage.look.labels, list(_rigid_bodies(run, step))
-        export_surface(step.surface, path, labels, beside=beside, option=_OUT)
+        colours, beside = even_colours(run.stage.look), list(_rigid_bodies(run, step))
+        export_surface(step.surface, path, colours, beside=beside, option=_OUT)
     return step
 
 
@@ -118,7 +119,7 @@ def _rigid_part(shape: Shape) -> RigidPart:
         shape.mesh.triangles,
         frame.vectors_to_world(shape.mesh.normals),
         tuple(np.rint(_MOST_BYTE * shape.colour).astype(int).tolist()),
-        is_steel=shape.is_end,
+        STEEL_ROUGHNESS if shape.is_end else ROUGHNESS,
     )
 
 

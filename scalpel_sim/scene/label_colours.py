@@ -53,6 +53,17 @@ class LabelColours(NamedTuple):
     """Colour of the faces of a cut."""
 
 
+class TissueColours(NamedTuple):
+    """Even colours of a body, for programs that have no textures of ours."""
+
+    skin: str = "9c3f32"
+    """Colour outside in sRGB: six hexadecimal digits."""
+    inside: str = "d4443c"
+    """Colour of the faces of a cut."""
+    labels: Sequence[LabelColours] = ()
+    """Of a body with several labels the colours of each, in their place."""
+
+
 def colours_of_scene(scene: Scene) -> tuple[LabelColours, ...]:
     """Return the colours of the labels of a scene's body; none of a body with one label."""
     mesh = scene.mesh()

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
+from scalpel_sim.scene.label_colours import TissueColours
 from scalpel_sim.viewer.charts import charts_of
 from scalpel_sim.viewer.looks import ORGAN_LOOK, Look, Ramp
 from scalpel_sim.viewer.primitives import TriangleMesh
@@ -194,6 +195,16 @@ def factors_of_labels(look: Look) -> tuple[FloatArray, FloatArray]:
     return tuple(
         each / np.maximum(each.max(axis=1, keepdims=True), 1.0) for each in (outside, inside)
     )
+
+
+_EVEN = 0.55
+"""Position on a ramp of the colour of tissue without its texture."""
+
+
+def even_colours(look: Look) -> TissueColours:
+    """Return the colours of a look without its texture."""
+    skin, inside = (colour_at(ramp, _EVEN) for ramp in (look.skin, look.inside))
+    return TissueColours(skin, inside, look.labels)
 
 
 def colour_at(ramp: Ramp, position: float) -> str:

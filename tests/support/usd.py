@@ -28,9 +28,9 @@ def usd_scene(path: Path) -> trimesh.Scene:
         faces = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
         shader, _, _ = material[0].ComputeSurfaceSource()
         colour = np.array(shader.GetInput("diffuseColor").Get())
-        metallic = shader.GetInput("metallic").Get()
+        roughness = shader.GetInput("roughness").Get()
         assert np.array_equal(mesh.GetDisplayColorAttr().Get()[0], colour)
-        paint = {"colour": colour, "metallic": metallic}
+        paint = {"colour": colour, "roughness": roughness}
         part = trimesh.Trimesh(points, faces, process=False, metadata=paint)
         name = f"{prim.GetParent().GetName()}_{prim.GetName()}"
         transform = np.array(UsdGeom.Imageable(prim).ComputeLocalToWorldTransform(0.0)).T

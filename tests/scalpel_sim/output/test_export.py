@@ -12,7 +12,9 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import ENDINGS, export_surface
 from scalpel_sim.output.surface_pieces import surface_pieces
-from scalpel_sim.scene.label_colours import LabelColours
+from scalpel_sim.scene.label_colours import LabelColours, TissueColours
+from scalpel_sim.viewer.looks import LOOKS
+from scalpel_sim.viewer.textures import even_colours
 from tests.support import strokes
 from tests.support.usd import usd_scene
 from tissue import Material, Surface, TetrahedralMesh, Tissue, block, liver_lobe
@@ -264,7 +266,7 @@ def labelled_surface() -> Surface:
 
 def test_faces_of_a_ply_have_the_label_and_its_colour(tmp_path):
     surface = labelled_surface()
-    export_surface(surface, tmp_path / "two.ply", LABELS)
+    export_surface(surface, tmp_path / "two.ply", TissueColours(labels=LABELS))
     read = trimesh.load(tmp_path / "two.ply")
     data = read.metadata["_ply_raw"]["face"]["data"]
     assert np.array_equal(data["label"].ravel(), surface.labels)
@@ -280,7 +282,7 @@ def test_faces_of_a_ply_have_the_label_and_its_colour(tmp_path):
 @pytest.mark.parametrize("ending", [".obj", ".glb", ".usda", ".usdc"])
 def test_groups_of_an_obj_and_meshes_of_a_glb_or_usd_are_one_for_each_label(ending, tmp_path):
     surface, path = labelled_surface(), tmp_path / f"two{ending}"
-    export_surface(surface, path, LABELS)
+    export_surface(surface, path, TissueColours(labels=LABELS))
     names = [
         f"piece_{piece}_{part}_{label}"
         for piece in (1, 2)
@@ -299,3 +301,15 @@ def test_groups_of_an_obj_and_meshes_of_a_glb_or_usd_are_one_for_each_label(endi
             fat = part.visual.material.baseColorFactor[:3] / 255.0
         np.testing.assert_allclose(fat, [0.875, 0.536, 0.0], atol=0.01)
     assert_is_closed(exported_mesh(path))
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usda"])
+def test_tissue_has_the_colour_that_its_material_has_on_pages(ending, tmp_path):
+    path = tmp_path / f"fat{ending}"
+    export_surface(Tissue(BLOCK).surface(), path, even_colours(LOOKS["fat"]))
+    scene = trimesh.load(path) if ending == ".glb" else usd_scene(path)
+    skin = scene.geometry["piece_1_skin"]
+    found = skin.metadata.get("colour")
+    if ending == ".glb":
+        found = skin.visual.material.baseColorFactor[:3] / 255.0
+    np.testing.assert_allclose(found, (np.array([0xDE, 0xB8, 0x5C]) / 255.0) ** 2.2, atol=0.01)

@@ -61,9 +61,9 @@ def test_the_arm_is_where_it_was_beside_the_body(ending, axes, recorded, tmp_pat
         np.testing.assert_allclose(
             [there.min(axis=0), there.max(axis=0)], expected.bounds, atol=ROUNDING
         )
-        colour, metallic = paint_of(mesh)
+        colour, roughness = paint_of(mesh)
         np.testing.assert_allclose(colour[:3], shape.colour[:3] ** 2.2, atol=0.01)
-        assert metallic == float(shape.is_end)
+        assert roughness == (0.25 if shape.is_end else 0.5)
         if shape.is_blade:
             edge = frame.points_to_tissue(np.array([step.blade.tip, step.blade.heel])) @ axes.T
             ways = np.linalg.norm(there[:, None] - edge, axis=2).min(axis=0)
@@ -71,11 +71,11 @@ def test_the_arm_is_where_it_was_beside_the_body(ending, axes, recorded, tmp_pat
 
 
 def paint_of(mesh):
-    """Return the colour, linear light from 0 to 1, and whether it is metal, 1 or 0."""
+    """Return the colour, linear light from 0 to 1, and the roughness."""
     if "colour" in mesh.metadata:
-        return mesh.metadata["colour"], mesh.metadata["metallic"]
+        return mesh.metadata["colour"], mesh.metadata["roughness"]
     material = mesh.visual.material
-    return material.baseColorFactor / 255.0, material.metallicFactor or 0.0
+    return material.baseColorFactor / 255.0, material.roughnessFactor
 
 
 def test_an_instant_is_written_as_tetrahedra_with_labels_and_their_names(recorded, tmp_path):
