@@ -247,7 +247,7 @@ class BodyView:
                 stretched direction is l times as long, in the tetrahedron that holds the point.
             marked: Which are marked, shape (n,); those are not looked at again.
         """
-        mark_strained(self._body, points.holders(self._body), float(limit), marked)
+        mark_strained(self._body, points.rest, points.last_holders, float(limit), marked)
 
     @property
     def n_cut_faces(self) -> int:

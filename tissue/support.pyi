@@ -10,7 +10,15 @@ from .core.kernel_folder import cache_directory as cache_directory
 from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
-from .geometry.near_triangles import mark_near_triangles as mark_near_triangles
+from .geometry.surface_places import PlaceTree as PlaceTree
+from .geometry.surface_places import deepen as deepen
+from .geometry.surface_places import least_distance as least_distance
+from .geometry.surface_places import mark_near_triangles as mark_near_triangles
+from .geometry.surface_places import place_tree as place_tree
+from .geometry.surface_places import write_distances as write_distances
+from .geometry.triangle_places import count_places as count_places
+from .geometry.triangle_places import write_edge_places as write_edge_places
+from .geometry.triangle_places import write_parts as write_parts
 from .io.mesh_io import read_mesh_file as read_mesh_file
 from .io.mesh_io import stand_in as stand_in
 from .io.mesh_report import likely_unit as likely_unit
@@ -39,7 +47,15 @@ __all__ = [
     "is_compiling",
     "likely_unit",
     "kernel",
+    "PlaceTree",
+    "count_places",
+    "deepen",
+    "least_distance",
     "mark_near_triangles",
+    "place_tree",
+    "write_distances",
+    "write_edge_places",
+    "write_parts",
     "n_compiled_kernels",
     "new_whole_file",
     "quality",

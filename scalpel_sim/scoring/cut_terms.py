@@ -3,16 +3,11 @@
 import numpy as np
 
 from scalpel_sim.scoring.plan import STATION
-from scalpel_sim.scoring.sampled_surface import (
-    TriangleParts,
-    parts_of_triangles,
-    places_on_edges,
-)
+from scalpel_sim.scoring.sampled_surface import parts_of_triangles, places_on_edges
 from scalpel_sim.scoring.yardstick import Yardstick
 from tissue import BoolArray, CutFaces, FloatArray
-from tissue.support import mark_near_triangles
 
-FACE_SPACING = 2e-3
+FACE_SPACING = 3e-3
 """Longest side of the parts of a face whose middles are compared with the plan [m]."""
 
 EDGE_SPACING = 0.5 * STATION
@@ -33,8 +28,11 @@ class CutTerms:
         self._yardstick = yardstick
         plan = yardstick.plan
         self._is_covered = np.zeros(0 if plan is None else len(plan.surface.points), bool)
+        self._area_covered, self._planned = 0.0, 0.0 if plan is None else plan.area
         self._reached = np.zeros(0 if plan is None else len(plan.stations))
         self._squares = 0.0
+        self.covered = None if plan is None else 0.0
+        """Share of the plan with a cut within the tolerance; None without a plan."""
         self.area = 0.0
         """Area of all cuts [m2]."""
         self.off_plan = 0.0
@@ -54,51 +52,45 @@ class CutTerms:
             return
         self.area += float(faces.areas.sum())
         self.area_of_cause += np.bincount(faces.causes, faces.areas, N_CAUSES)
-        parts = parts_of_triangles(faces.corners, FACE_SPACING)
-        on_edges = places_on_edges(faces.corners, EDGE_SPACING)
-        self._compare(faces.corners, parts, on_edges)
-        places = np.concatenate([on_edges, parts.middles])
+        corners = faces.corners.reshape(-1, 3)
+        middles, _, areas = parts_of_triangles(corners, FACE_SPACING)
+        on_edges = places_on_edges(corners, EDGE_SPACING)
+        self._compare_with_plan(corners, middles, areas)
+        if self._yardstick.station_search is not None:
+            self._yardstick.station_search.deepen(on_edges, self._reached)
         for i, part in enumerate(self._yardstick.spared):
             is_within = (faces.labels == part.label).all(axis=1)
-            self.spared_area[i] += float(faces.areas[is_within].sum())
-            nearest = 0.0
-            if not is_within.any():
-                nearest = float(part.search.distances(places).min())
-            self.spared_distance[i] = min(float(self.spared_distance[i]), nearest)
+            if is_within.any():
+                self.spared_area[i] += float(faces.areas[is_within].sum())
+                self.spared_distance[i] = 0.0
+            for places in (on_edges, middles):
+                least = float(self.spared_distance[i])
+                self.spared_distance[i] = part.search.least_distance(places, least)
 
-    def _compare(self, corners: FloatArray, parts: TriangleParts, on_edges: FloatArray) -> None:
+    def _compare_with_plan(
+        self, corners: FloatArray, middles: FloatArray, areas: FloatArray
+    ) -> None:
         """Compare faces with the plan.
 
         Args:
-            corners: Their corners [m], shape (n, 3, 3).
-            parts: Their parts.
-            on_edges: Places on their edges [m], shape (n_places, 3).
+            corners: Corners of the faces one after the other [m], shape (3 n, 3).
+            middles: Middles of their parts [m], shape (n_parts, 3).
+            areas: Areas of their parts [m2], shape (n_parts,).
         """
-        plan, search = self._yardstick.plan, self._yardstick.plan_search
-        if plan is None or search is None:
+        search = self._yardstick.plan_search
+        if search is None:
             return
-        tolerance, stations = self._yardstick.task.tolerance, self._yardstick.station_search
-        distances = search.distances(parts.middles)
-        self.off_plan += float(parts.areas[distances > tolerance].sum())
-        self._squares += float(parts.areas @ distances**2)
-        in_rows = corners.reshape(-1, 3)
-        self.largest_error = max(self.largest_error, float(search.distances(in_rows).max()))
-        mark_near_triangles(plan.surface.points, in_rows, tolerance, self._is_covered)
-        if stations is not None:
-            np.maximum(self._reached, stations.deepest(on_edges), out=self._reached)
+        tolerance, distances = self._yardstick.task.tolerance, search.distances(middles)
+        self.off_plan += float(areas @ (distances > tolerance))
+        self._squares += float(areas @ distances**2)
+        self.largest_error = max(self.largest_error, float(search.distances(corners).max()))
+        self._area_covered += search.mark_near(corners, tolerance, self._is_covered)
+        self.covered = 1.0 if self._is_covered.all() else self._area_covered / self._planned
 
     @property
     def is_covered(self) -> BoolArray:
         """Which places of the plan have a cut within the tolerance, shape (n,). A copy."""
         return self._is_covered.copy()
-
-    @property
-    def covered(self) -> float | None:
-        """Share of the plan with a cut within the tolerance; None without a plan."""
-        plan = self._yardstick.plan
-        if plan is None:
-            return None
-        return float(plan.surface.areas[self._is_covered].sum() / plan.area)
 
     @property
     def path_error(self) -> float:

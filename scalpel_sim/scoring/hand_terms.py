@@ -2,7 +2,7 @@
 
 import math
 
-from tissue import FloatArray, Wrench
+from tissue import Wrench
 
 _OF_JERK = 4
 """Places from which a third derivative follows."""
@@ -39,18 +39,19 @@ class HandTerms:
         """Count the wrench on it in a frame of `dt` [s]."""
         x, y, z = wrench.numbers[:3]
         size = math.sqrt(x * x + y * y + z * z)
-        self.force = max(self.force, size)
+        if size > self.force:
+            self.force = size
         self.impulse += size * dt
 
-    def move(self, place: FloatArray, holds: bool, dt: float) -> None:
+    def move(self, place: tuple[float, ...], holds: bool, dt: float) -> None:
         """Count a control step.
 
         Args:
-            place: Where it is now [m], shape (3,).
+            place: Where it is now, x, y and z [m].
             holds: Whether it holds tissue.
             dt: Length of the control step [s].
         """
-        self._last = (*self._last[-3:], tuple(place.tolist()))
+        self._last = (*self._last[-3:], place)
         self._n_steps += 1
         if self._n_steps >= 2:
             self.path_length += math.dist(*self._last[-2:])

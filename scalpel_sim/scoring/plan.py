@@ -19,6 +19,7 @@ from scalpel_sim.strokes.asked import PassedPlaces, tetrahedra_at
 from scalpel_sim.strokes.skin import BodySkin
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, IntArray, Snapshot, TetrahedralMesh
+from tissue.support import deepen, place_tree
 
 PLAN_SUFFIX = ".npz"
 """Suffix of a file of a plan."""
@@ -77,28 +78,18 @@ class StationSearch:
     """
 
     def __init__(self, stations: FloatArray, into: FloatArray, aside: float) -> None:
-        from scipy.spatial import cKDTree  # 0.2 s, and only here
-
-        self._stations, self._into = stations, into
+        self._into, self._heights = into, stations @ into
         self._reach = math.hypot(aside, 0.5 * STATION)
-        self._tree = cKDTree(_seen_along(stations, into))
+        self._seen = place_tree(_seen_along(stations, into))
 
-    def deepest(self, points: FloatArray) -> FloatArray:
-        """Return how deep the deepest of some places is below each station [m], shape (k,).
-
-        Minus infinity where there is none.
+    def deepen(self, points: FloatArray, depths: FloatArray) -> None:
+        """Write how deep the deepest of some places is below each station, where that is more.
 
         Args:
             points: In the body at rest [m], shape (n, 3).
+            depths: Written [m], shape (k,).
         """
-        depths = np.full(len(self._stations), -np.inf)
-        seen = _seen_along(points, self._into)
-        distances, found = self._tree.query(seen, distance_upper_bound=self._reach)
-        is_below = np.isfinite(distances)
-        station = found[is_below]
-        deep = (points[is_below] - self._stations[station]) @ self._into
-        np.maximum.at(depths, station, deep)
-        return depths
+        deepen(self._seen, self._into, self._heights, self._reach, points, depths)
 
 
 def plan_of(task: TaskTable, stroke: Stroke, body: Snapshot) -> Plan | None:
@@ -277,7 +268,9 @@ def _plan(surface: SampledSurface, line: FloatArray, into: FloatArray, body: Sna
     stations, depths = _stations(line, into), np.zeros(0)
     if len(stations):
         search = StationSearch(stations, into, PLAN_SPACING)
-        depths = search.deepest(kept.points) + 0.5 * PLAN_SPACING
+        depths = np.full(len(stations), -np.inf)
+        search.deepen(kept.points, depths)
+        depths += 0.5 * PLAN_SPACING
         is_planned = depths > PLAN_SPACING
         stations, depths = stations[is_planned], depths[is_planned]
     return Plan(kept, into, line, stations, depths)

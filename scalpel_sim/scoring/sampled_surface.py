@@ -4,7 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue import FloatArray
+from tissue import BoolArray, FloatArray
+from tissue.support import (
+    count_places,
+    least_distance,
+    mark_near_triangles,
+    place_tree,
+    write_distances,
+    write_edge_places,
+    write_parts,
+)
 
 PLAN_SPACING = 2.5e-4
 """Distance between two places on a plan [m]."""
@@ -33,10 +42,11 @@ class SurfaceSearch:
     """
 
     def __init__(self, surface: SampledSurface, spacing: float = PLAN_SPACING) -> None:
-        from scipy.spatial import cKDTree  # 0.2 s, and only here
-
-        self.surface = surface
-        self._tree = cKDTree(surface.points)
+        self._tree = place_tree(surface.points)
+        self._normals, self._areas = (
+            surface.normals[self._tree.number],
+            surface.areas[self._tree.number],
+        )
         self._cell = _HALF_DIAGONAL * spacing
 
     def distances(self, points: FloatArray) -> FloatArray:
@@ -48,12 +58,23 @@ class SurfaceSearch:
         Args:
             points: In the body at rest [m], shape (n, 3).
         """
-        _, nearest = self._tree.query(points)
-        offsets = points - self.surface.points[nearest]
-        across = np.einsum("ni,ni->n", offsets, self.surface.normals[nearest])
-        squares = np.einsum("ni,ni->n", offsets, offsets)
-        along = np.sqrt(np.maximum(squares - across * across, 0.0))
-        return np.asarray(np.hypot(across, np.maximum(along - self._cell, 0.0)))
+        found = np.empty(len(points))
+        write_distances(self._tree, self._normals, self._cell, points, found)
+        return found
+
+    def least_distance(self, points: FloatArray, least: float) -> float:
+        """Return the least of a distance and those of points [m]: faster than all of them."""
+        return least_distance(self._tree, self._normals, self._cell, points, least)
+
+    def mark_near(self, corners: FloatArray, within: float, marked: BoolArray) -> float:
+        """Mark the places of the surface near some triangles; return the area of new ones [m2].
+
+        Args:
+            corners: Corners of the triangles one after the other [m], shape (3 n, 3).
+            within: Distance up to which a place is near [m].
+            marked: Those that are marked already are not looked at, shape (n_places,).
+        """
+        return mark_near_triangles(self._tree, self._areas, corners, within, marked)
 
 
 class TriangleParts(NamedTuple):
@@ -68,47 +89,33 @@ class TriangleParts(NamedTuple):
 
 
 def parts_of_triangles(corners: FloatArray, spacing: float) -> TriangleParts:
-    """Divide triangles into equal parts, k x k of each, with sides of `spacing` [m] at most."""
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    counts = np.maximum(np.ceil(sides.max(axis=1, initial=0.0) / spacing), 1).astype(np.int64)
-    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(crossed, axis=1)
-    normals = crossed / np.maximum(lengths, np.finfo(float).tiny)[:, None]
-    middles, owner = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
-    for k in np.unique(counts).tolist():
-        mine = np.flatnonzero(counts == k)
-        middles.append(np.einsum("pk,nkx->npx", _weights_of_parts(k), corners[mine]).reshape(-1, 3))
-        owner.append(np.repeat(mine, k * k))
-    triangle = np.concatenate(owner)
-    areas = (0.5 * lengths / counts**2)[triangle]
-    return TriangleParts(np.concatenate(middles), normals[triangle], areas)
+    """Divide triangles into equal parts, k x k of each.
 
-
-def _weights_of_parts(k: int) -> FloatArray:
-    """Return the barycentric weights of the middles of the k x k parts of a triangle."""
-    i, j = (each.ravel() for each in np.meshgrid(np.arange(k), np.arange(k), indexing="ij"))
-    upright, turned = i + j < k, i + j < k - 1
-    first = np.concatenate([i[upright] + 1.0 / 3.0, i[turned] + 2.0 / 3.0]) / k
-    second = np.concatenate([j[upright] + 1.0 / 3.0, j[turned] + 2.0 / 3.0]) / k
-    return np.column_stack([1.0 - first - second, first, second])
+    Args:
+        corners: Of the triangles one after the other [m], shape (3 n, 3).
+        spacing: Longest side of a part [m].
+    """
+    counts = np.empty(len(corners), np.int64)
+    n, _ = count_places(corners, spacing, counts)
+    parts = TriangleParts(np.empty((n, 3)), np.empty((n, 3)), np.empty(n))
+    write_parts(corners, counts, *parts)
+    return parts
 
 
 def places_on_edges(corners: FloatArray, spacing: float) -> FloatArray:
-    """Return places on the edges of triangles, `spacing` apart at most, shape (n, 3).
+    """Return places on the edges of triangles, shape (n_places, 3).
 
     In any direction the farthest place of a triangle is on an edge.
 
     Args:
-        corners: Of the triangles [m], shape (n_triangles, 3, 3).
-        spacing: [m].
+        corners: Of the triangles one after the other [m], shape (3 n, 3).
+        spacing: Their distance along an edge at most [m].
     """
-    starts = corners.reshape(-1, 3)
-    ways = np.roll(corners, -1, axis=1).reshape(-1, 3) - starts
-    counts = np.maximum(np.ceil(np.linalg.norm(ways, axis=1) / spacing), 1).astype(np.int64)
-    edge = np.repeat(np.arange(len(starts)), counts)
-    first = np.cumsum(counts) - counts
-    shares = (np.arange(len(edge)) - first[edge]) / counts[edge]
-    return np.asarray(starts[edge] + shares[:, None] * ways[edge])
+    counts = np.empty(len(corners), np.int64)
+    _, n = count_places(corners, spacing, counts)
+    places = np.empty((n, 3))
+    write_edge_places(corners, counts, places)
+    return places
 
 
 def sampled_triangles(corners: FloatArray, spacing: float = PLAN_SPACING) -> SampledSurface:
@@ -118,5 +125,5 @@ def sampled_triangles(corners: FloatArray, spacing: float = PLAN_SPACING) -> Sam
         corners: Of the triangles [m], shape (n, 3, 3).
         spacing: Longest side of a part [m].
     """
-    parts = parts_of_triangles(corners, spacing)
+    parts = parts_of_triangles(np.ascontiguousarray(corners).reshape(-1, 3), spacing)
     return SampledSurface(parts.middles, parts.normals, parts.areas)

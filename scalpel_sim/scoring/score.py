@@ -40,19 +40,20 @@ class Score:
         self._tissue = _tissue_of(simulation)
         self._n_faces = 0 if self._tissue is None else self._tissue.n_cut_faces
         limit = yardstick.force_limit
-        self._graspers = tuple(simulation.graspers)
-        names = [each.name for each in self._graspers]
+        graspers = simulation.graspers
         self.hands = (
             HandTerms(BLADE_NAME, limit(BLADE_NAME), can_hold=False),
-            *(HandTerms(name, limit(name), can_hold=True) for name in names),
+            *(HandTerms(each.name, limit(each.name), can_hold=True) for each in graspers),
         )
         """Terms of each instrument, the blade first."""
+        self._graspers = tuple(zip(self.hands[1:], graspers, strict=True))
         self.cut = CutTerms(yardstick)
         """Terms of the cut."""
         self._strains = tuple(StrainTerm(each) for each in yardstick.strains)
         self._pieces = PiecesTerm(yardstick, body, simulation.link.n_pieces())
         self._time = 0.0
         self._work = (0.0, 0.0)
+        self._has_labels = len(simulation.link.describe().labels) > 1
         self._work_of_labels: tuple[float, ...] = ()
         self._exposed: float | None = None
         self.look_for_target: Callable[[], float] | None = None
@@ -70,15 +71,15 @@ class Score:
 
     def after_frame(self, simulation: Simulation) -> None:
         """Count a frame, and where it ends a control step, that."""
-        dt, blade, graspers = simulation.dt, simulation.blade, self._graspers
-        self.hands[0].feel(blade.wrench, dt)
-        for terms, each in zip(self.hands[1:], graspers, strict=True):
+        dt, blade, of_blade = simulation.dt, simulation.blade, self.hands[0]
+        of_blade.feel(blade.wrench, dt)
+        for terms, each in self._graspers:
             terms.feel(each.wrench, dt)
         if simulation.n_frames % self._every == 0:
             dt *= self._every
-            self.hands[0].move(blade.segment.tip, False, dt)
-            for terms, each in zip(self.hands[1:], graspers, strict=True):
-                terms.move(each.grasper.pads.centre, each.holds, dt)
+            of_blade.move(blade.segment.numbers[:3], False, dt)
+            for terms, each in self._graspers:
+                terms.move(tuple(each.grasper.pads.centre.tolist()), each.holds, dt)
             self.look(simulation)
 
     def look(self, simulation: Simulation) -> None:
@@ -87,7 +88,8 @@ class Score:
         result = simulation.bridge.result
         if result is not None:
             self._work = (result.work_of_blade, result.work_of_cutting)
-            self._work_of_labels = tuple(result.cutting_of_labels.tolist())
+            if self._has_labels:
+                self._work_of_labels = tuple(result.cutting_of_labels.tolist())
         if self.look_for_target is not None:
             self._exposed = self.look_for_target()
         if self._tissue is None:

@@ -57,8 +57,11 @@ class PiecesTerm:
 
     def look(self, tissue: Tissue) -> None:
         """Look at the pieces after new faces were cut."""
-        self.n = tissue.n_pieces()
-        if self._target is None or self.n <= self._n_at_first:
+        n = tissue.n_pieces()
+        if n == self.n:  # a cut joins none, so they are the same
+            return
+        self.n = n
+        if self._target is None or n <= self._n_at_first:
             return
         body = tissue.snapshot()
         piece, volumes = piece_of_tetrahedra(body), _volumes(body)

@@ -25,7 +25,7 @@ from tissue.elasticity.internal_forces import Elastic, deform
 from tissue.elasticity.rest_shapes import rest_normals
 from tissue.elasticity.springs import NO_LENGTH
 from tissue.geometry.tetrahedron import Symmetric, largest_eigenvalue, tetrahedron_volume
-from tissue.mesh.body import Body
+from tissue.mesh.body import INSIDE_TOLERANCE, Body, holder_near
 
 
 @kernel
@@ -45,19 +45,28 @@ def strains_of_tetrahedra(body: Body, strains: FloatArray) -> None:
 
 
 @kernel
-def mark_strained(body: Body, tetrahedra: IntArray, limit: float, marked: BoolArray) -> None:
-    """Mark where the largest principal strain is above a limit.
+def mark_strained(
+    body: Body, points: FloatArray, holders: IntArray, limit: float, marked: BoolArray
+) -> None:
+    """Mark material points where the largest principal strain is above a limit.
 
     Args:
         body: The body.
-        tetrahedra: Some of its tetrahedra, shape (n,).
+        points: The points in the body at rest [m], shape (n, 3).
+        holders: The tetrahedron that held each last, or -1 where it is not known, shape (n,);
+            written where another does now.
         limit: The limit, above 0.
         marked: Those that are marked already are not looked at, shape (n,).
     """
-    for i in range(len(tetrahedra)):
+    for i in range(len(holders)):
         if marked[i]:
             continue
-        e, _ = green_lagrange(body, tetrahedra[i])
+        p, t = vec3(points, i), holders[i]
+        shape = rest_normals(body, max(t, 0))
+        if t < 0 or not _holds(body, t, shape, p):
+            t = holder_near(body, p, t)
+            holders[i], shape = t, rest_normals(body, t)
+        e = _strain(body, t, shape)
         square = e.xx * e.xx + e.yy * e.yy + e.zz * e.zz
         square += 2.0 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)
         # It is the sum of the squares of all principal strains.
@@ -66,9 +75,26 @@ def mark_strained(body: Body, tetrahedra: IntArray, limit: float, marked: BoolAr
 
 
 @kernel
+def _holds(body: Body, t: int, shape: tuple[Vec3, Vec3, Vec3, float], p: Vec3) -> bool:
+    """Return whether a tetrahedron holds a place of the body at rest [m]; `shape`: its normals."""
+    n1, n2, n3, volume = shape
+    offset = sub(p, vec3(body.rest, body.tetrahedra[t, 0]))
+    b, c, d = dot(n1, offset), dot(n2, offset), dot(n3, offset)
+    a = 6.0 * volume - b - c - d
+    return min(min(a, b), min(c, d)) >= -INSIDE_TOLERANCE * 6.0 * volume
+
+
+@kernel
 def green_lagrange(body: Body, t: int) -> tuple[Symmetric, float]:
     """Return E of a tetrahedron, and its volume at rest [m3]."""
-    n1, n2, n3, volume = rest_normals(body, t)
+    shape = rest_normals(body, t)
+    return _strain(body, t, shape), shape[3]
+
+
+@kernel
+def _strain(body: Body, t: int, shape: tuple[Vec3, Vec3, Vec3, float]) -> Symmetric:
+    """Return E of a tetrahedron with these normals."""
+    n1, n2, n3, volume = shape
     d0 = _displacement(body, body.tetrahedra[t, 0])
     d1 = sub(_displacement(body, body.tetrahedra[t, 1]), d0)
     d2 = sub(_displacement(body, body.tetrahedra[t, 2]), d0)
@@ -78,7 +104,7 @@ def green_lagrange(body: Body, t: int) -> tuple[Symmetric, float]:
     x = _column(per, d1, d2, d3, n1.x, n2.x, n3.x)
     y = _column(per, d1, d2, d3, n1.y, n2.y, n3.y)
     z = _column(per, d1, d2, d3, n1.z, n2.z, n3.z)
-    strain = Symmetric(
+    return Symmetric(
         x.x + 0.5 * dot(x, x),
         y.y + 0.5 * dot(y, y),
         z.z + 0.5 * dot(z, z),
@@ -86,7 +112,6 @@ def green_lagrange(body: Body, t: int) -> tuple[Symmetric, float]:
         0.5 * (x.z + z.x + dot(x, z)),
         0.5 * (y.z + z.y + dot(y, z)),
     )
-    return strain, volume
 
 
 @kernel

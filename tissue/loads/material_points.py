@@ -33,6 +33,11 @@ class MaterialPoints:
     def __len__(self) -> int:
         return len(self.rest)
 
+    @property
+    def last_holders(self) -> IntArray:
+        """The tetrahedron that held each point when it was looked up last, shape (n,)."""
+        return self._tetrahedra
+
     def holders(self, body: Body) -> IntArray:
         """Return the tetrahedron that holds each point now, shape (n,)."""
         # Cuts split tetrahedra and move nodes at rest: the points stay where they are.

@@ -262,6 +262,34 @@ def walk(body: Body, p: Vec3, start: int) -> Walk:
 
 
 @kernel
+def holder_near(body: Body, p: Vec3, last: int) -> int:
+    """Return the tetrahedron that holds a place of the body at rest [m].
+
+    Where none does it is the one that the place is least outside of. What a cut makes of a
+    tetrahedron keeps its label, and bodies touch at rest: so another label does not count.
+
+    Args:
+        body: The body.
+        p: The place.
+        last: The tetrahedron that held it before; -1 where that is not known.
+    """
+    label, mine = body.materials.label, -1
+    if last >= 0:
+        mine, found = label[body.material[last]], walk(body, p, last)
+        if found.inside and label[body.material[found.tetrahedron]] == mine:
+            return found.tetrahedron
+    held, deepest = last, -np.inf
+    for t in range(body.n_tetrahedra - 1, -1, -1):  # the parts of one come last
+        if mine < 0 or label[body.material[t]] == mine:
+            depth = smallest_weight(barycentric_in(p, body.rest, body.tetrahedra, t))
+            if depth > deepest:
+                held, deepest = t, depth
+            if depth >= -INSIDE_TOLERANCE:
+                break
+    return held
+
+
+@kernel
 def _beyond(body: Body, p: Vec3, t: int, link: int) -> int:
     """Return the tetrahedron behind a face; of six, the one that `p` [m] is least outside of."""
     if link >= 0:

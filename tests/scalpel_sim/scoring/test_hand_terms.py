@@ -17,7 +17,7 @@ def led_along(way, seconds=1.0, **settings):
     """Return the terms of an instrument that was led along a way over time."""
     hand = HandTerms("left", None, **({"can_hold": True} | settings))
     for i in range(round(seconds / DT) + 1):
-        hand.move(np.array(way(DT * i)), False, DT)
+        hand.move(way(DT * i), False, DT)
     return hand
 
 
@@ -52,6 +52,6 @@ def test_the_polynomial_of_a_jerk_has_it_and_even_motion_has_none():
 def test_a_hold_is_a_share_of_the_time_and_a_loss_counts_once():
     hand = HandTerms("left", None, can_hold=True)
     for holds in [False] * 5 + [True] * 10 + [False] * 3 + [True] * 2:
-        hand.move(np.zeros(3), holds, DT)
+        hand.move((0.0, 0.0, 0.0), holds, DT)
     assert hand.held == 12 / 20
     assert hand.dropped == 1

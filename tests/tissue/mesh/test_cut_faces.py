@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from tests.support import bodies, strokes
 from tissue import BladeShape, Material, SolverSettings, Tissue, TissueState, block
 from tissue.blade.prescribed_cut import cut_along
-from tissue.support import mark_near_triangles
+from tissue.support import mark_near_triangles, place_tree
 
 ROUNDING = 1e-9
 """Relative difference of two sums of the same areas."""
@@ -159,6 +159,24 @@ def test_a_point_that_was_marked_stays_so():
     assert marked.tolist() == [True, False]
 
 
+def test_a_material_point_is_looked_for_among_what_a_cut_has_made():
+    tissue = held(block((4, 6, 4), (0.04, 0.06, 0.04)))
+    before = tissue.snapshot()
+    middles = before.rest_positions[before.tetrahedra].mean(axis=1)
+    points = tissue.material_points(middles)
+    ends, forward = [(0.013, -0.01), (0.021, 0.07)], np.array([0.1, 1.0, 0.0]) / 1.01**0.5
+    tissue.incise([[(*at, z) for z in (0.013, 0.05)] for at in ends], forward)
+    assert tissue.n_tetrahedra > len(middles)
+    tissue.mark_strained(points, 0.5, np.zeros(len(middles), bool))
+    after = tissue.snapshot()
+    corners = after.rest_positions[after.tetrahedra[points.last_holders]]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    weights = np.linalg.solve(edges, (middles - corners[:, 0])[..., None])[..., 0]
+    assert weights.min() > -1e-8
+    assert weights.sum(axis=1).max() < 1.0 + 1e-8
+    assert (points.last_holders != np.arange(len(middles))).any()
+
+
 def test_points_near_a_triangle_are_marked():
     """Against the nearest of 200,000 places on the triangle."""
     random = np.random.default_rng(3)
@@ -167,6 +185,11 @@ def test_points_near_a_triangle_are_marked():
     distances, _ = cKDTree(shares @ corners).query(points)
     clear = np.abs(distances - 0.5) > 0.01
     marked = np.zeros(len(points), bool)
-    mark_near_triangles(points, corners, 0.5, marked)
+    tree = place_tree(points)
+    areas = random.uniform(0.0, 1.0, len(points))
+    marked[:9] = True
+    area = mark_near_triangles(tree, areas[tree.number], corners, 0.5, marked)
+    assert area == pytest.approx(areas[9:][marked[9:]].sum())
+    marked[:9] = distances[:9] < 0.5
     np.testing.assert_array_equal(marked[clear], distances[clear] < 0.5)
     assert 30 < marked.sum() < 270
