@@ -21,6 +21,7 @@ from tissue import (
     BladeShape,
     BladeSweep,
     Chunks,
+    CutFaces,
     CutReport,
     Deformation,
     FloatArray,
@@ -86,6 +87,8 @@ class TissueDescription(NamedTuple):
     """Cameras of the scene; the first of them at the start."""
     labels: tuple[NamedLabel, ...] = ()
     """Labels of the body, in order; none of a body with one label that has no name."""
+    n_cut_faces: int = 0
+    """Number of faces that cuts have opened so far."""
 
 
 class TissueLink(Protocol):
@@ -183,6 +186,20 @@ class TissueLink(Protocol):
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
 
+    @property
+    def n_cut_faces(self) -> int:
+        """Number of faces that cuts have opened; over a connection as of the last step."""
+
+    def cut_faces(self, since: int = 0) -> CutFaces:
+        """Return the faces that cuts have opened, in order; see `Tissue.cut_faces`.
+
+        Args:
+            since: Number of the first of them: those before are known.
+
+        Raises:
+            ValueError: fewer faces were cut.
+        """
+
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
 
@@ -230,6 +247,7 @@ class InProcessLink:
             self._tissue.floor,
             self._views,
             self._labels(),
+            self.n_cut_faces,
         )
 
     def _labels(self) -> tuple[NamedLabel, ...]:
@@ -326,6 +344,15 @@ class InProcessLink:
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
         return self._tissue.n_pieces()
+
+    @property
+    def n_cut_faces(self) -> int:
+        """Number of faces that cuts have opened."""
+        return self._tissue.n_cut_faces
+
+    def cut_faces(self, since: int = 0) -> CutFaces:
+        """Return the faces that cuts have opened, in order; see `Tissue.cut_faces`."""
+        return self._tissue.cut_faces(since)
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""

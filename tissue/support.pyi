@@ -27,6 +27,7 @@ from .io.whole_file import remove_unfinished as remove_unfinished
 from .io.whole_file import whole_file as whole_file
 from .mesh.faces import OUTWARD as OUTWARD
 from .mesh.faces import sorted_faces as sorted_faces
+from .mesh.parts import labels_of_part as labels_of_part
 from .mesh.pieces import components as components
 from .mesh.validation import quality as quality
 from .mesh.validation import signed_volumes as signed_volumes
@@ -47,6 +48,7 @@ __all__ = [
     "is_compiling",
     "likely_unit",
     "kernel",
+    "labels_of_part",
     "PlaceTree",
     "count_places",
     "deepen",

@@ -19,14 +19,17 @@ from bridge.link import TissueDescription
 from bridge.tcp.connection import ANSWER_SECONDS, Connection, Served
 from bridge.tcp.messages.body import (
     CHUNKS,
+    CUT_FACES,
     CUT_REPORT,
     DEFORMATION,
     LARGEST_CHUNKS,
     PIECES,
     QUANTITY,
+    SINCE,
     SNAPSHOT,
     SURFACE,
     VALUES,
+    cut_faces_bytes,
     deformation_bytes,
     snapshot_bytes,
     surface_bytes,
@@ -49,6 +52,7 @@ from bridge.tcp.wire import MessageError, MessageKind
 from tissue import (
     BladeSweep,
     Chunks,
+    CutFaces,
     CutReport,
     Deformation,
     FloatArray,
@@ -118,6 +122,7 @@ class TcpLink:
             MessageKind.HELLO, b"", LARGEST_DESCRIPTION, DESCRIPTION.unpack
         )
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
+        self._n_cut_faces = description.n_cut_faces
         self._label_names = {each.label: each.name for each in description.labels if each.name}
         return description
 
@@ -141,7 +146,7 @@ class TcpLink:
         request = pack_step(sweep, dt, poses, geoms)
         unpack = functools.partial(_checked_result, self._loads, n_geoms)
         answer = self._connection.request(MessageKind.STEP, request, LARGEST_RESULT, unpack)
-        result, self._loads, self._geom_loads = answer
+        result, self._loads, self._geom_loads, self._n_cut_faces = answer
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
 
@@ -214,6 +219,19 @@ class TcpLink:
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
         return self._connection.request(MessageKind.PIECES, b"", MAP_BYTES, PIECES.unpack)
+
+    @property
+    def n_cut_faces(self) -> int:
+        """Number of faces that cuts had opened at the end of the last step."""
+        return self._n_cut_faces
+
+    def cut_faces(self, since: int = 0) -> CutFaces:
+        """Return the faces that cuts have opened, in order; see `TissueLink.cut_faces`."""
+        n = self._n_cut_faces
+        if not 0 <= since <= n:
+            raise ValueError(f"there is no face number {since}: {n} were cut so far")
+        limit, request = cut_faces_bytes(n - since), SINCE.pack(since)
+        return self._connection.request(MessageKind.CUT_FACES, request, limit, CUT_FACES.unpack)
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""

@@ -16,10 +16,12 @@ from bridge.link import InProcessLink, SceneView
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
 from bridge.tcp.messages.body import (
     CHUNKS,
+    CUT_FACES,
     CUT_REPORT,
     DEFORMATION,
     PIECES,
     QUANTITY,
+    SINCE,
     SNAPSHOT,
     SURFACE,
     VALUES,
@@ -129,6 +131,7 @@ class TissueServer(SingleClientServer):
             ),
             MessageKind.COLLIDE: self._collide,
             MessageKind.RELEASE: self._release,
+            MessageKind.CUT_FACES: self._cut_faces,
             MessageKind.VALUES: lambda payload: VALUES.pack(
                 self._link.surface_values(QUANTITY.unpack(payload))
             ),
@@ -180,7 +183,8 @@ class TissueServer(SingleClientServer):
             self._limits.check_poses(poses, link.loads()[-link.n_driven :])
         with _refusals():
             result = link.step(sweep, dt, poses, geoms)
-        return RESULT.pack(StepReply(result, link.loads(), link.geom_loads()))
+        reply = StepReply(result, link.loads(), link.geom_loads(), link.n_cut_faces)
+        return RESULT.pack(reply)
 
     def _add(self, add: Callable[[], int]) -> bytes:
         """Add a driven frame, and return the load on it.
@@ -204,6 +208,16 @@ class TissueServer(SingleClientServer):
         with _refusals():
             self._link.release(number)
         return LOAD.pack(self._link.loads()[number])
+
+    def _cut_faces(self, payload: bytes) -> bytes:
+        """Return faces that cuts have opened.
+
+        Raises:
+            MessageError: there are fewer.
+        """
+        since = SINCE.unpack(payload)
+        with _refusals():
+            return CUT_FACES.pack(self._link.cut_faces(since))
 
     def _collide(self, payload: bytes) -> bytes:
         """Replace the geoms that the tissue touches, and return an empty reply.

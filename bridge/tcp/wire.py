@@ -17,12 +17,12 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-PROTOCOL_VERSION = 11
+PROTOCOL_VERSION = 12
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
 contacts and energies of a step; 6 added driven frames; 7 added driven geoms
 and ties; 8 added values at the surface; 9 made contents
 MessagePack; 10 added stress and strain of tetrahedra;
-11 added labels of surfaces."""
+11 added labels of surfaces; 12 added the list of cut faces."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be kept before it can be checked. A step request
@@ -64,6 +64,7 @@ class MessageKind(enum.IntEnum):
     MEASURED = 17
     END = 18
     DEFORMATION = 19
+    CUT_FACES = 20
 
 
 class Frame(NamedTuple):

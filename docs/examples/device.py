@@ -26,7 +26,7 @@ def connected(port):
 
 def ask(sequence, kind, payload=b""):
     """Return the content of the reply to a request."""
-    head = struct.pack("<4sHHIII", b"SCUT", 11, kind, sequence, len(payload), zlib.crc32(payload))
+    head = struct.pack("<4sHHIII", b"SCUT", 12, kind, sequence, len(payload), zlib.crc32(payload))
     connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
     head = connection.recv(24, socket.MSG_WAITALL) or sys.exit("the run has gone")
     _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)

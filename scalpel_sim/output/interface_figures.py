@@ -9,28 +9,27 @@ from tissue import Snapshot
 
 
 def interface_figures(outcome: RunOutcome) -> list[dict[str, Any]]:
-    """Return the area of each layer at rest, and how much of it is open; none of a lost body."""
-    rows = outcome.settings.get("interfaces", ())
-    first, last = outcome.first, outcome.last
-    if last is None or not rows:
+    """Return the area of each layer at rest, and how much was cut; none where faces are unknown.
+
+    These are the faces between its parts: what is cut beside it, in one of them, is not of it.
+    """
+    rows, faces = outcome.settings.get("interfaces", ()), outcome.cut_faces
+    if faces is None:
         return []
     found = []
     for row in rows:
-        parts = [_labels_of(outcome, name) for name in row["between"]]
-        whole, left = (_shared_area(each, parts) for each in (first, last))
+        one, other = parts = [_labels_of(outcome, name) for name in row["between"]]
+        is_of_one, is_of_other = (np.isin(faces.labels, part) for part in (one, other))
+        is_between = is_of_one.any(axis=1) & is_of_other.any(axis=1)
         found.append(
             {
                 "between": list(row["between"]),
                 "toughness_j_m2": row["toughness"],
-                "area_m2": whole,
-                "cut_area_m2": max(whole - left, 0.0) if left < (1.0 - _ROUNDING) * whole else 0.0,
+                "area_m2": _shared_area(outcome.first, parts),
+                "cut_area_m2": float(faces.areas[is_between].sum()),
             }
         )
     return found
-
-
-_ROUNDING = 1e-9
-"""Share of the area of a layer below which what is open of it is rounding."""
 
 
 def _labels_of(outcome: RunOutcome, name: str) -> list[int]:

@@ -17,6 +17,7 @@ from scalpel_sim.strokes.expected_force import length_inside
 from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
+    CutFaces,
     CutReport,
     FloatArray,
     Piece,
@@ -58,6 +59,8 @@ class RunOutcome:
     """The body at the end; None where the link to the tissue was lost."""
     report: CutReport | None
     """Report on the cut at the end; None where the link to the tissue was lost."""
+    cut_faces: CutFaces | None
+    """All faces that were cut; None where the link to the tissue was lost."""
     status: str = COMPLETE
     """`complete`, or what ended the run before its time."""
     wall_seconds: float = 0.0
@@ -322,7 +325,8 @@ def outcome_of(
         status: `complete`, or what ended the run before its time.
     """
     bridge, stroke, score = simulation.bridge, simulation.stroke, simulation.score
-    if score is not None:
+    is_reached = last is not None
+    if score is not None and is_reached:
         score.look(simulation)
     return RunOutcome(
         recording=simulation.recording,
@@ -334,6 +338,7 @@ def outcome_of(
         first=first,
         last=last,
         report=report,
+        cut_faces=simulation.link.cut_faces() if is_reached else None,
         status=status,
         wall_seconds=simulation.wall_seconds,
         tetrahedra_final=(bridge.result or tissue).n_tetrahedra,

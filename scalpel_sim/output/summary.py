@@ -90,7 +90,7 @@ class Summary(NamedTuple):
     edge. Empty without labels."""
     interfaces: list[dict[str, Any]]
     """Of each layer between two parts: `between`, `toughness_j_m2`, `area_m2` at rest, and
-    `cut_area_m2`, how much of it is open."""
+    `cut_area_m2`, how much of it was cut."""
     score: dict[str, Any] | None
     """The score against the task (`scoring.score.Score.figures`); None of a run without one."""
     cores: list[dict[str, Any]]

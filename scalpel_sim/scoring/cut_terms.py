@@ -59,7 +59,7 @@ class CutTerms:
         if self._yardstick.station_search is not None:
             self._yardstick.station_search.deepen(on_edges, self._reached)
         for i, part in enumerate(self._yardstick.spared):
-            is_within = (faces.labels == part.label).all(axis=1)
+            is_within = np.isin(faces.labels, part.labels).all(axis=1)
             if is_within.any():
                 self.spared_area[i] += float(faces.areas[is_within].sum())
                 self.spared_distance[i] = 0.0

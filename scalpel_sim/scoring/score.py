@@ -37,8 +37,9 @@ class Score:
     def __init__(self, yardstick: Yardstick, simulation: Simulation, body: Snapshot) -> None:
         self._yardstick = yardstick
         self._every = max(round(CONTROL_STEP / simulation.dt), 1)
+        self._link = simulation.link
         self._tissue = _tissue_of(simulation)
-        self._n_faces = 0 if self._tissue is None else self._tissue.n_cut_faces
+        self._n_faces = self._link.n_cut_faces
         limit = yardstick.force_limit
         graspers = simulation.graspers
         self.hands = (
@@ -92,38 +93,35 @@ class Score:
                 self._work_of_labels = tuple(result.cutting_of_labels.tolist())
         if self.look_for_target is not None:
             self._exposed = self.look_for_target()
-        if self._tissue is None:
-            return
-        n = self._tissue.n_cut_faces
-        if n > self._n_faces:
-            self.cut.take(self._tissue.cut_faces(since=self._n_faces))
-            self._pieces.look(self._tissue)
-            self._n_faces = n
-        for strain in self._strains:
-            strain.look(self._tissue)
+        if self._link.n_cut_faces > self._n_faces:
+            faces = self._link.cut_faces(since=self._n_faces)
+            self._n_faces += faces.n
+            self.cut.take(faces)
+            self._pieces.look(self._link)
+        if self._tissue is not None:
+            for strain in self._strains:
+                strain.look(self._tissue)
 
     def terms(self) -> dict[str, float]:
         """Return the terms as of the last control step, by name, in SI units.
 
         Those that are not known are left out: without a plan, a target, limits of strain or a
-        camera; and those of the tissue where that is in another process.
+        camera; and strain where the tissue is in another process.
         """
         task, hands = self._yardstick.task, self.hands
-        found: dict[str, float | None] = {}
-        if self._tissue is not None:
-            found |= _terms_of_cut(self.cut, self.plan)
-            if task.spare:
-                found |= {
-                    "spared": float(self.cut.is_spared),
-                    "spared_area": float(self.cut.spared_area.sum()),
-                }
-                if self.cut.area > 0.0:
-                    found["spared_distance"] = float(self.cut.spared_distance.min())
-            if self._strains:
-                found["strain_above"] = sum(each.volume for each in self._strains)
-            found["pieces"] = float(self._pieces.n)
-            if task.target is not None:
-                found |= {"removed": self._pieces.removed, "healthy": self._pieces.healthy}
+        found = _terms_of_cut(self.cut, self.plan)
+        if task.spare:
+            found |= {
+                "spared": float(self.cut.is_spared),
+                "spared_area": float(self.cut.spared_area.sum()),
+            }
+            if self.cut.area > 0.0:
+                found["spared_distance"] = float(self.cut.spared_distance.min())
+        if self._strains and self._tissue is not None:
+            found["strain_above"] = sum(each.volume for each in self._strains)
+        found["pieces"] = float(self._pieces.n)
+        if task.target is not None:
+            found |= {"removed": self._pieces.removed, "healthy": self._pieces.healthy}
         found |= {
             "force": max(each.force for each in hands),
             "force_above": max(each.force_above for each in hands),
@@ -156,7 +154,7 @@ class Score:
     def figures(self) -> dict[str, Any]:
         """Return the terms as of the last control step, for `summary.json`."""
         task, cut, failed = self._yardstick.task, self.cut, self.failed()
-        has_tissue, terms, asked = self._tissue is not None, self.terms(), _asked(task.success)
+        terms, asked = self.terms(), _asked(task.success)
         unknown = [name for name in asked if name not in terms]
         known = [name for name in failed or [] if name not in unknown]
         is_known = failed is not None and (known or not unknown)
@@ -169,8 +167,8 @@ class Score:
             "terms": terms,
             "planned_area_m2": None if self.plan is None else self.plan.area,
             "tolerance_m": task.tolerance,
-            "area_by_blade_m2": float(cut.area_of_cause[0]) if has_tissue else None,
-            "area_finished_m2": float(cut.area_of_cause[1]) if has_tissue else None,
+            "area_by_blade_m2": float(cut.area_of_cause[0]),
+            "area_finished_m2": float(cut.area_of_cause[1]),
             "spared": [
                 {
                     "label": part.name,
@@ -179,12 +177,11 @@ class Score:
                     "distance_m": float(cut.spared_distance[i]) if cut.area > 0.0 else None,
                 }
                 for i, part in enumerate(self._yardstick.spared)
-                if has_tissue
             ],
             "strains": [
                 {"label": row.name, "limit": row.limit, "volume_m3": term.volume}
                 for row, term in zip(self._yardstick.strains, self._strains, strict=True)
-                if has_tissue
+                if self._tissue is not None
             ],
             "instruments": [_figures_of_hand(each) for each in self.hands],
             "work_of_blade_j": self._work[0],

@@ -1,9 +1,13 @@
 """Terms of the tissue: where it was stretched too far, and what was cut out of it."""
 
+from typing import NamedTuple
+
 import numpy as np
 
+from bridge import TissueLink
 from scalpel_sim.scoring.yardstick import StrainLimit, Yardstick
 from tissue import FloatArray, IntArray, MaterialPoints, Snapshot, Tissue, piece_of_tetrahedra
+from tissue.support import components
 
 
 class StrainTerm:
@@ -36,7 +40,8 @@ class StrainTerm:
 class PiecesTerm:
     """Pieces of the body, and what was cut out of it.
 
-    What is cut out is all but the largest piece, or but as many as the body had at first.
+    What is cut out is all but the largest piece, or but as many as there were at first. Of several
+    bodies that do not hang together, each is looked at by itself.
 
     Args:
         yardstick: The target.
@@ -46,8 +51,8 @@ class PiecesTerm:
 
     def __init__(self, yardstick: Yardstick, body: Snapshot, n_pieces: int) -> None:
         self._target = yardstick.target
-        self._of_target = float(_volumes(body)[body.labels == yardstick.target].sum())
-        self._n_at_first = n_pieces
+        self._of_target = float(_volumes(body)[np.isin(body.labels, self._target)].sum())
+        self._bodies = _bodies_of(body) if self._target else ()
         self.n = n_pieces
         """Number of pieces."""
         self.removed = 0.0
@@ -55,20 +60,44 @@ class PiecesTerm:
         self.healthy = 0.0
         """Volume of other tissue that was cut out [m3]."""
 
-    def look(self, tissue: Tissue) -> None:
+    def look(self, link: TissueLink) -> None:
         """Look at the pieces after new faces were cut."""
-        n = tissue.n_pieces()
-        if n == self.n:  # a cut joins none, so they are the same
+        n = link.n_pieces()
+        if n == self.n:  # cuts join none, so they are the same
             return
         self.n = n
-        if self._target is None or n <= self._n_at_first:
+        if not self._target:
             return
-        body = tissue.snapshot()
+        body = link.snapshot()
         piece, volumes = piece_of_tetrahedra(body), _volumes(body)
-        is_out = piece >= self._n_at_first  # the largest comes first
-        is_target = body.labels == self._target
+        is_out = np.zeros(len(piece), bool)
+        for each in self._bodies:
+            largest_first = np.unique(piece[np.isin(body.labels, each.labels)])
+            is_out |= np.isin(piece, largest_first[each.n_pieces :])
+        is_target = np.isin(body.labels, self._target)
         self.removed = float(volumes[is_out & is_target].sum()) / self._of_target
         self.healthy = float(volumes[is_out & ~is_target].sum())
+
+
+class _Body(NamedTuple):
+    """A body before any cut: labels that hang together."""
+
+    labels: IntArray
+    """Its labels, shape (n,)."""
+    n_pieces: int
+    """Number of its pieces: of a mesh that was in several."""
+
+
+def _bodies_of(body: Snapshot) -> tuple[_Body, ...]:
+    """Return the bodies before any cut."""
+    labels, label = np.unique(body.labels, return_inverse=True)
+    piece = piece_of_tetrahedra(body)
+    n = int(piece.max()) + 1
+    # Pieces and labels are vertices of a graph, with an edge where a piece has a label.
+    pairs = np.unique(np.stack([piece, n + label.reshape(-1)], axis=1), axis=0)
+    n_bodies, of_vertex = components(n + len(labels), pairs)
+    of_piece, of_label = of_vertex[:n], of_vertex[n:]
+    return tuple(_Body(labels[of_label == i], int((of_piece == i).sum())) for i in range(n_bodies))
 
 
 def _volumes(body: Snapshot) -> FloatArray:

@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.scene.task_table import TaskTable
+from scalpel_sim.scene.task_table import SpareTable, TaskTable
 from scalpel_sim.scoring.plan import Plan, StationSearch, plan_of
 from scalpel_sim.scoring.sampled_surface import PLAN_SPACING, SurfaceSearch, sampled_triangles
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, IntArray, Snapshot, boundary_faces
+from tissue.support import labels_of_part
 
 _MOST_PLACES = 50_000
 """Places on the surface of a part that is to be spared, about, at most."""
@@ -21,8 +22,8 @@ class SparedPart(NamedTuple):
 
     name: str
     """Its name."""
-    label: int
-    """Its label."""
+    labels: tuple[int, ...]
+    """Its labels."""
     margin: float
     """Distance from it that no cut may come below [m]."""
     search: SurfaceSearch
@@ -59,8 +60,8 @@ class Yardstick(NamedTuple):
     """Parts that are to stay whole."""
     strains: tuple[StrainLimit, ...]
     """Limits of strain."""
-    target: int | None
-    """Label of the target; None: there is none."""
+    target: tuple[int, ...]
+    """Labels of the target; none where there is none."""
 
     def force_limit(self, instrument: str) -> float | None:
         """Return the force of an instrument that counts as no excess [N]; None: any."""
@@ -97,12 +98,9 @@ def yardstick_of(
         plan,
         search,
         stations,
-        tuple(
-            _spared(row.label, row.margin, _label_of(row.label, names, "spare"), body)
-            for row in task.spare
-        ),
+        tuple(_spared(row, _labels_of(row.label, names, "spare"), body) for row in task.spare),
         _strain_limits(task, body, names),
-        None if task.target is None else _label_of(task.target, names, "target"),
+        () if task.target is None else _labels_of(task.target, names, "target"),
     )
 
 
@@ -116,30 +114,30 @@ def _expect_no_plan_needed(task: TaskTable) -> None:
             )
 
 
-def _label_of(name: str, names: Mapping[int, str], key: str) -> int:
-    """Return the label of that name.
+def _labels_of(name: str, names: Mapping[int, str], key: str) -> tuple[int, ...]:
+    """Return the labels of a part: those of that name; or of a body, with those of its parts.
 
     Raises:
         UsageError: there is none; the message lists them.
     """
-    for label, known in names.items():
-        if known == name:
-            return label
     if not names:
         raise UsageError(f"[task] {key} names '{name}', and the body has no [[label]]")
-    raise UsageError(f"[task] {key}: {unknown('label', name, names.values())}")
+    try:
+        return tuple(labels_of_part(list(names), names, name))
+    except ValueError as error:
+        raise UsageError(f"[task] {key}: {unknown('label', name, names.values())}") from error
 
 
-def _spared(name: str, margin: float, label: int, body: Snapshot) -> SparedPart:
+def _spared(row: SpareTable, labels: tuple[int, ...], body: Snapshot) -> SparedPart:
     """Return a part that is to stay whole."""
-    corners = body.rest_positions[boundary_faces(body.tetrahedra[body.labels == label])]
+    is_mine = np.isin(body.labels, labels)
+    corners = body.rest_positions[boundary_faces(body.tetrahedra[is_mine])]
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * float(np.linalg.norm(sides, axis=1).sum())
     # Parts of a triangle are about half the square of their longest side.
     spacing = max(PLAN_SPACING, (2.0 * area / _MOST_PLACES) ** 0.5)
-    return SparedPart(
-        name, label, margin, SurfaceSearch(sampled_triangles(corners, spacing), spacing)
-    )
+    search = SurfaceSearch(sampled_triangles(corners, spacing), spacing)
+    return SparedPart(row.label, labels, row.margin, search)
 
 
 def _strain_limits(
@@ -148,16 +146,16 @@ def _strain_limits(
     """Return the limits of strain; that of no label is of what has none of its own."""
     rows = [row for row in task.limits if row.strain is not None]
     own = {
-        row.label: _label_of(row.label, names, "limits") for row in rows if row.label is not None
+        row.label: _labels_of(row.label, names, "limits") for row in rows if row.label is not None
     }
     corners = body.rest_positions[body.tetrahedra]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
     found = []
     for row in rows:
         if row.label is None:
-            is_mine = ~np.isin(body.labels, list(own.values()))
+            is_mine = ~np.isin(body.labels, [label for labels in own.values() for label in labels])
         else:
-            is_mine = body.labels == own[row.label]
+            is_mine = np.isin(body.labels, own[row.label])
         mine = np.flatnonzero(is_mine)
         assert row.strain is not None
         middles = corners[mine].mean(axis=1)

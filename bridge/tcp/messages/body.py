@@ -17,6 +17,7 @@ from bridge.tcp.messages.encoding import (
 from bridge.tcp.wire import LARGEST_FRAME, MessageError
 from tissue import (
     Chunks,
+    CutFaces,
     CutReport,
     Deformation,
     FloatArray,
@@ -36,6 +37,11 @@ _TETRAHEDRON_BYTES = 4 * 8 + 8
 _VERTEX_BYTES = 3 * 8 + 3 * 8
 _TRIANGLE_BYTES = 3 * 8 + 1 + 8
 
+_FACE_BYTES = 9 * 8 + 8 + 2 * 8 + 8 + 8
+
+_N_CAUSES = 3
+"""Number of causes of a cut face: see `tissue.CutFaces`."""
+
 _Natural = Annotated[float, msgspec.Meta(ge=0.0)]
 """A float that is not negative; infinity is the time step of a body that cannot move."""
 
@@ -53,6 +59,11 @@ def deformation_bytes(n_tetrahedra: int) -> int:
 def surface_bytes(n_tetrahedra: int) -> int:
     """Return the largest length of a surface [byte]: every face of every tetrahedron."""
     return MAP_BYTES + 4 * n_tetrahedra * (_TRIANGLE_BYTES + 3 * _VERTEX_BYTES)
+
+
+def cut_faces_bytes(n_faces: int) -> int:
+    """Return the length of a list of cut faces [byte], at most."""
+    return MAP_BYTES + n_faces * _FACE_BYTES
 
 
 def values_bytes(n_nodes: int) -> int:
@@ -77,6 +88,14 @@ def _check_chunks(chunks: Chunks) -> None:
         raise MessageError("the box of a chunk is not finite or inverted")
     if not 0.0 <= fastest < math.inf:
         raise MessageError(f"the fastest node moves at {fastest} m/s; wanted 0 or more, finite")
+
+
+def _check_cut_faces(faces: CutFaces) -> None:
+    expect_finite(faces.corners, faces.areas, faces.times)
+    if (faces.areas < 0.0).any():
+        raise MessageError("a cut face has an area below 0")
+    if not ((faces.causes >= 0) & (faces.causes < _N_CAUSES)).all():
+        raise MessageError(f"a cut face has no cause from 0 to {_N_CAUSES - 1}")
 
 
 def _check_cut_report(report: CutReport) -> None:
@@ -151,6 +170,23 @@ CHUNKS: Message[Chunks] = Message(
 
 PIECES: Message[int] = Message(Count, "the number of pieces")
 """The reply with the number of connected pieces."""
+
+SINCE: Message[int] = Message(Count, "the number of the first cut face")
+"""The request for cut faces."""
+
+CUT_FACES: Message[CutFaces] = Message(
+    Record(
+        CutFaces,
+        corners=("faces", 3, 3),
+        areas=("faces",),
+        labels=("faces", 2),
+        causes=("faces",),
+        times=("faces",),
+    ),
+    "the list of cut faces",
+    _check_cut_faces,
+)
+"""The reply with faces that cuts have opened, in order."""
 
 CUT_REPORT: Message[CutReport] = Message(
     Record(

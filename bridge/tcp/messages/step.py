@@ -69,6 +69,8 @@ class StepReply(NamedTuple):
     """Loads on all frames."""
     geom_loads: GeomLoads
     """Loads on the driven geoms."""
+    n_cut_faces: int
+    """Number of faces that cuts have opened so far."""
 
 
 def pack_step(
@@ -200,6 +202,7 @@ RESULT: Message[StepReply] = Message(
         ),
         loads=LOADS_ON_FRAMES,
         geom_loads=Record(GeomLoads, forces=("geoms", 3), torques=("geoms", 3)),
+        n_cut_faces=Count,
     ),
     "the reply to a step",
     _check_reply,

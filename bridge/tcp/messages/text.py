@@ -121,6 +121,7 @@ DESCRIPTION: Message[TissueDescription] = Message(
         bounds=(2, 3),
         n_tetrahedra=Count,
         n_nodes=Count,
+        n_cut_faces=Count,
         floor=FiniteFloat,
         views=Many(
             Record(

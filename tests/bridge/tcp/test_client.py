@@ -30,7 +30,7 @@ from tests.bridge.tcp.bare_sockets import (
     read_all,
 )
 from tests.bridge.tcp.serve_block import block_tissue as make_block
-from tissue import BladeSegment, BladeSweep, RigidContacts
+from tissue import BladeSegment, BladeSweep, CutFaces, RigidContacts
 
 
 @pytest.fixture
@@ -71,6 +71,19 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert here.n_pieces() == link.n_pieces()
     assert bits(here.cut_report()) == bits(link.cut_report())
     assert link.cut_report().n_cut_nodes > 0
+    assert 5 < link.n_cut_faces == here.n_cut_faces
+    assert bits(here.cut_faces()) == bits(link.cut_faces())
+
+
+def test_cut_faces_are_sent_from_the_first_that_is_asked_for(link, upright):
+    cut(link, upright)
+    whole, n = link.cut_faces(), link.n_cut_faces
+    for since in (0, n - 3, n):
+        found = link.cut_faces(since=since)
+        assert bits(found) == bits(CutFaces(*(each[since:] for each in whole)))
+    with pytest.raises(ValueError, match=f"there is no face number {n + 1}: {n} were cut"):
+        link.cut_faces(since=n + 1)
+    assert link.describe().n_cut_faces == n
 
 
 def test_the_description_is_that_of_the_tissue_that_is_served(link):
@@ -119,7 +132,7 @@ def test_what_the_tissue_refuses_is_a_refused_request(link, upright):
         (bytes(100), "is not scalpel-sim"),
         (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
-        (HELLO[:4] + b"\x0a\x00" + HELLO[6:], "uses version 10 of the protocol and this one 11"),
+        (HELLO[:4] + b"\x0a\x00" + HELLO[6:], "uses version 10 of the protocol and this one 12"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
         (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],

@@ -12,7 +12,7 @@ from bridge.device.messages import STATE as DEVICE_STATE
 from bridge.driven import GeomLoads
 from bridge.tcp.address import IDLE_SECONDS, N_PROBES, PROBE_SECONDS, parse_address
 from bridge.tcp.channel import Authenticator, direction_keys
-from bridge.tcp.messages.body import CHUNKS, CUT_REPORT, DEFORMATION, SNAPSHOT, SURFACE
+from bridge.tcp.messages.body import CHUNKS, CUT_FACES, CUT_REPORT, DEFORMATION, SNAPSHOT, SURFACE
 from bridge.tcp.messages.driven import ATTACHMENT, GEOMS, MAX_GEOMS, TIE
 from bridge.tcp.messages.encoding import Array
 from bridge.tcp.messages.step import RESULT, STEP
@@ -77,7 +77,7 @@ def test_the_client_prints_why_the_server_refuses_it(start_server):
 
 
 def test_every_kind_of_message_is_in_the_table():
-    table = dict(re.findall(r"^\| (\d+) \| ([A-Z]+) \|", WIRE, re.MULTILINE))
+    table = dict(re.findall(r"^\| (\d+) \| ([A-Z_]+) \|", WIRE, re.MULTILINE))
     assert {int(kind): name for kind, name in table.items()} == {
         kind: kind.name for kind in MessageKind
     }
@@ -136,7 +136,7 @@ RESULT_PART = RESULT._part._parts["result"]
     [
         ("HELLO", [DESCRIPTION]),
         ("STEP", [STEP, RESULT, RESULT_PART]),
-        ("The body", [SNAPSHOT, SURFACE, DEFORMATION, CHUNKS, CUT_REPORT]),
+        ("The body", [SNAPSHOT, SURFACE, DEFORMATION, CUT_FACES, CHUNKS, CUT_REPORT]),
         ("Driven frames", [ATTACHMENT, TIE]),
         ("Driven geoms", [GEOMS]),
         ("A device that drives", [DEVICE_DESCRIPTION, SERVO, DEVICE_STATE]),

@@ -7,9 +7,11 @@ from msgspec import structs
 
 from scalpel_sim import SCENES, Camera, SimulationState, StrokeTable, WaypointTable, prepare
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.read import read_scene
 from scalpel_sim.scene.schema import LabelTable, ViewTable
 from scalpel_sim.scene.task_table import LimitTable, SpareTable, SuccessTable, TaskTable
 from scalpel_sim.strokes.scene_stroke import stroke_through
+from tests.scalpel_sim.scene.test_several_bodies import EXAMPLE
 from tissue import TetrahedralMesh
 
 TASK = TaskTable(
@@ -73,6 +75,48 @@ def test_shaking_gains_nothing():
     assert terms["path_length"] > 2.0 * still["path_length"]
 
 
+def on_skin(depth, **motion):
+    """Return a stroke over the plan with the edge along the skin, pressed down by a depth."""
+    edge = {"length": 0.03, "edge": (0.0, 1.0, 0.0), "forward": (0.0, 0.0, -1.0)}
+    low = (0.02, 0.03, 0.04 - depth)
+    return StrokeTable(**({"kind": "points", "points": [(0.02, 0.03, 0.045), low]} | edge | motion))
+
+
+def test_shaking_in_contact_gains_nothing():
+    """The edge is pressed 3 mm down over the plan, and goes to and fro across it."""
+    swings = [(0.02 + 0.001 * (-1) ** i, 0.03, 0.037) for i in range(20)]
+    shaken = on_skin(0.003, points=[(0.02, 0.03, 0.045), *swings], speed=0.1)
+    terms, still = (done(slab(strokes=(each,))).terms() for each in (shaken, on_skin(0.003)))
+    assert terms["covered"] == terms["off_plan"] == terms["cut_area"] == 0.0
+    assert terms["force"] > 0.2
+    assert terms["impulse"] > 1.5 * still["impulse"]
+    assert terms["path_length"] > 1.5 * still["path_length"]
+
+
+def test_what_is_cut_by_shaking_along_the_edge_is_paid_for():
+    sawn = on_skin(0.005, speed=0.01, saw_amplitude=0.004, saw_frequency=8.0)
+    terms = done(slab(strokes=(sawn,))).terms()
+    assert 0.0 < terms["covered"] < 0.3
+    assert terms["work"] > SCENES["slab"].material.toughness * terms["cut_area"]
+
+
+def test_shaking_in_a_cut_covers_no_more_than_the_blade_has_reached():
+    """The blade stops halfway, and goes to and fro by 4 mm in what it has cut."""
+    straight = {"kind": "points", "length": 0.03, "forward": (0.0, 1.0, 0.0), "edge": (0, 0, 1)}
+    half = 0.03
+    ends = [(0.02, -0.03, 0.02), (0.02, half, 0.02)]
+    to_and_fro = [(0.02, half - back, 0.02) for _ in range(5) for back in (0.004, 0.0)]
+    scene = slab(strokes=(StrokeTable(kind="points", **ALONG),))
+    once = done(scene, stroke=StrokeTable(**straight, points=ends)).terms()
+    shaken = done(scene, stroke=StrokeTable(**straight, points=[*ends, *to_and_fro])).terms()
+    reached = (half + TASK.tolerance - 0.001) / 0.058  # of the line, which begins at 1 mm
+    assert 0.4 < once["covered"] <= shaken["covered"] <= reached
+    assert shaken["cut_area"] <= half * 0.02
+    assert shaken["off_plan"] == 0.0
+    assert shaken["path_length"] > once["path_length"] + 0.03
+    assert shaken["impulse"] > 1.5 * once["impulse"]
+
+
 def test_tearing_gains_nothing():
     """A grasper pulls at the lobe of `retract` until the tissue slips out of its jaws."""
     (grasper,) = SCENES["retract"].graspers
@@ -97,6 +141,24 @@ def test_tearing_gains_nothing():
     assert 0.0 < terms["left_held"] < 0.8
     assert terms["force_above"] > 0.1
     assert score.failed() == ["covered", "strain_above"]
+
+
+def test_a_scene_of_several_bodies_is_scored_as_one(tmp_path):
+    """The example of the page: a cut parts the muscle and the fat on it, beside a vessel."""
+    path = tmp_path / "scene.toml"
+    path.write_text(EXAMPLE, "utf-8")
+    task = TaskTable(kind="excise", target="fat", spare=(SpareTable(label="muscle/vessel"),))
+    score = done(structs.replace(read_scene(path), task=task))
+    terms, figures = score.terms(), score.figures()
+    muscle, fat = 0.04 * 0.008, 0.035 * 0.006
+    assert figures["planned_area_m2"] == pytest.approx(muscle + fat, rel=0.02)
+    assert terms["covered"] > 0.95
+    assert terms["cut_area"] == pytest.approx(muscle + fat, rel=0.05)
+    assert terms["pieces"] == 4.0
+    assert terms["removed"] == pytest.approx(0.5, abs=0.06)
+    assert terms["healthy"] == pytest.approx(0.5 * 0.05 * muscle, rel=0.12)
+    assert terms["spared"] == 1.0
+    assert terms["spared_distance"] == pytest.approx(0.01, abs=2e-4)  # cells are 5 mm wide
 
 
 @pytest.fixture(scope="module")

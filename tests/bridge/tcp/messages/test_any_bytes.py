@@ -26,10 +26,12 @@ from bridge.driven import (
 from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     CHUNKS,
+    CUT_FACES,
     CUT_REPORT,
     DEFORMATION,
     PIECES,
     QUANTITY,
+    SINCE,
     SNAPSHOT,
     SURFACE,
     VALUES,
@@ -60,6 +62,13 @@ N_MUTATIONS = 2000
 """Number of changed copies of each message."""
 
 
+def cut_faces():
+    """Return the faces of a cut through a block."""
+    tissue = block_tissue()
+    tissue.incise([[(0.009, y, z) for z in (-0.1, 0.1)] for y in (-0.1, 0.1)], (0.0, 1.0, 0.0))
+    return tissue.cut_faces()
+
+
 @functools.cache
 def real_messages():
     """Return a message of each kind, from a real tissue, and its decoder."""
@@ -81,11 +90,13 @@ def real_messages():
         "loads": (LOADS.pack(LOADS_ON_TWO), LOADS.unpack),
         "number": (NUMBER.pack(1), NUMBER.unpack),
         "result": (
-            RESULT.pack(StepReply(result, LOADS_ON_TWO, GEOM_LOADS)),
+            RESULT.pack(StepReply(result, LOADS_ON_TWO, GEOM_LOADS, 3)),
             lambda payload: unpack_result(payload, 2),
         ),
         "snapshot": (SNAPSHOT.pack(tissue.snapshot()), SNAPSHOT.unpack),
         "deformation": (DEFORMATION.pack(tissue.deformation()), DEFORMATION.unpack),
+        "since": (SINCE.pack(2), SINCE.unpack),
+        "cut faces": (CUT_FACES.pack(cut_faces()), CUT_FACES.unpack),
         "chunks": (CHUNKS.pack(tissue.chunks()), CHUNKS.unpack),
         "surface": (SURFACE.pack(tissue.surface()), SURFACE.unpack),
         "quantity": (QUANTITY.pack("strain"), QUANTITY.unpack),
@@ -136,6 +147,13 @@ IS_VALID = {
         and len(value.where)
     ),
     "loads": lambda value: all(load.n_points >= 0 for load in value),
+    "since": lambda value: value >= 0,
+    "cut faces": lambda value: (
+        is_finite(value.corners, value.areas, value.times)
+        and len(value.corners) == len(value.labels) == len(value.areas)
+        and value.areas.min(initial=0.0) >= 0.0
+        and set(value.causes.tolist()) <= {0, 1, 2}
+    ),
     "chunks": lambda value: is_finite(value.boxes) and 0.0 <= value.fastest < np.inf,
     "description": lambda value: is_finite(value.bounds) and value.material.density > 0.0,
     "error": str.isprintable,

@@ -121,7 +121,9 @@ def replies(draw):
         energies=draw(st.none() | st.builds(Energies, *[any_float] * len(Energies._fields))),
     )
     loads = tuple(FrameLoad(Wrench(*draw(rows(3, any_float))), i) for i in range(n))
-    return StepReply(result, loads, GeomLoads(draw(rows(3, any_float)), draw(rows(3, any_float))))
+    return StepReply(
+        result, loads, GeomLoads(draw(rows(3, any_float)), draw(rows(3, any_float))), n
+    )
 
 
 @given(replies())
@@ -131,7 +133,7 @@ def test_a_reply_arrives_bit_for_bit_even_where_the_tissue_diverged(reply):
 
 def packed_reply(n_geoms=0, **changes):
     loads = (FrameLoad(Wrench(*np.zeros((3, 3))), 7),)
-    return RESULT.pack(StepReply(result_of(**changes), loads, no_geom_loads(n_geoms)))
+    return RESULT.pack(StepReply(result_of(**changes), loads, no_geom_loads(n_geoms), 0))
 
 
 def contacts(n, geom):
