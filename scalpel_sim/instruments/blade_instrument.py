@@ -63,7 +63,7 @@ class BladeInstrument:
     @stroke.setter
     def stroke(self, stroke: Stroke) -> None:
         self._stroke = stroke
-        self.progress = StrokeProgress() if stroke.guards else None
+        self.progress = StrokeProgress(stroke) if stroke.guards else None
         """Progress of a stroke with guards; None of one that goes by the time alone."""
         self.controller: Controller = StrokeFollower(self._hand, stroke, self._frame)
         """Leads the blade in each frame."""

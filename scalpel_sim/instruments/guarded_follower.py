@@ -13,13 +13,15 @@ import numpy as np
 
 from bridge import TissueFrame, TissueLink
 from scalpel_sim.arm.hand import Hand
+from scalpel_sim.instruments.line_pursuit import LastLook, LinePursuit
 from scalpel_sim.instruments.stroke_follower import StrokeFollower
 from scalpel_sim.strokes.asked import n_large
-from scalpel_sim.strokes.guard import Guard
+from scalpel_sim.strokes.guard import LONGEST_PURSUIT, Guard
 from scalpel_sim.strokes.sequence import through_air
+from scalpel_sim.strokes.skin_course import SkinCourse
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import SPEED_UP_TIME
-from tissue import StepResult, pieces_of
+from tissue import BladeSegment, StepResult, pieces_of
 
 LONGEST_WAY = 10.0
 """Longest time on the way through the air from a stroke to the next [s]: a metre."""
@@ -33,6 +35,7 @@ OVER, ENDED = "leading over", "ended"
 
 AS_PLANNED, THROUGH, STOPPED = "as planned", "through", "stopped at the limit of force"
 GAVE_UP, DREW_BACK = "gave up waiting at the limit of force", "drew back at the limit of force"
+DRAGGED = "gave up: the tissue went along with the blade"
 """Ends that a stroke may have."""
 
 
@@ -46,9 +49,13 @@ class StrokeEnd(NamedTuple):
 
 
 class StrokeProgress:
-    """Progress of strokes: all that a saved state must know of them."""
+    """Progress of strokes: all that a saved state must know of them.
 
-    def __init__(self) -> None:
+    Args:
+        stroke: The strokes, with their guards.
+    """
+
+    def __init__(self, stroke: Stroke) -> None:
         self.force = 0.0
         """Force on the blade in the last frame [N]."""
         self.at = 0.0
@@ -64,7 +71,9 @@ class StrokeProgress:
         """Which of the strokes it is, or the next one."""
         self.has_begun = False
         self.waited = 0.0
-        """Time that it has lost [s]."""
+        """Time that it has lost by waiting [s]."""
+        self.lost = 0.0
+        """Time that it has lost because the tissue went along with the blade [s]."""
         self.n_before = 0
         """Number of pieces before it, where that counts."""
         self.area_before = 0.0
@@ -73,6 +82,11 @@ class StrokeProgress:
         """Area that was cut when pieces were counted last [m2]."""
         self.box: tuple[float, ...] = ()
         """Lowest and highest corner of the body when the blade was led over [m]."""
+        self.shift = (0.0, 0.0, 0.0)
+        """Where the tip is led to, from where the plan has it [m]."""
+        courses = [guard.course for guard in stroke.guards]
+        self.looks = [LastLook(0 if each is None else len(each.times)) for each in courses]
+        """The last look at the line of each stroke."""
         self.ends: tuple[StrokeEnd, ...] = ()
         """Ends of strokes so far."""
 
@@ -117,6 +131,7 @@ class GuardedFollower:
     ) -> None:
         self._hand, self._stroke, self._frame = hand, stroke, frame
         self._link, self._bridge, self.progress = link, bridge, progress
+        self._pursuit = LinePursuit(stroke, link, progress)
         self._node_size = math.nan
         self._follower = StrokeFollower(hand, stroke, frame)
         self._way: tuple[tuple[float, int], Stroke, StrokeFollower] | None = None
@@ -137,10 +152,27 @@ class GuardedFollower:
             progress.part += 1
             progress.at = self._guard.begin
             progress.enter(GOING)
+        if progress.mode != ENDED and not self._is_following:
+            self._pursuit.leave(step)
+        path, at, follower = self._stroke, progress.at, self._follower
         if progress.mode == OVER:
-            self._way_over()[1].lead(progress.seconds)
+            at = progress.seconds
+            path, follower = self._way_over()
+        if any(progress.shift):
+            self._lead_beside(path.pose(at))
         else:
-            self._follower.lead(progress.at)
+            follower.lead(at)
+
+    def _lead_beside(self, pose: BladeSegment) -> None:
+        """Lead the blade to a pose, moved by the shift."""
+        tip, heel = pose.tip + self.progress.shift, pose.heel + self.progress.shift
+        self._hand.follow(self._frame.segment_to_world(BladeSegment(tip, heel, pose.forward)))
+
+    @property
+    def _is_following(self) -> bool:
+        """Whether the blade follows a line on the skin."""
+        progress = self.progress
+        return progress.mode == GOING and progress.has_begun and self._guard.course is not None
 
     @property
     def _guard(self) -> Guard:
@@ -157,12 +189,14 @@ class GuardedFollower:
                 self._end(THROUGH, SLOWING)
                 return
             if guard.at_limit == "wait":
-                self._yield_to_force(step)
+                step = self._yield_to_force(step)
             elif progress.force > guard.force_limit:
                 is_back = guard.at_limit == "draw back"
                 self._end(*((DREW_BACK, DRAWING_BACK) if is_back else (STOPPED, ENDED)))
             if progress.mode != GOING:
                 return
+            if guard.course is not None:
+                self._follow_line(guard.course, step)
         # Without a delay this is the time itself, to the bit.
         progress.at = progress.at_since + progress.seconds
         while progress.part < len(guards) and progress.at >= self._guard.end:
@@ -175,23 +209,38 @@ class GuardedFollower:
     def _begin(self) -> None:
         """Note what was there before a stroke."""
         progress = self.progress
-        progress.has_begun, progress.waited = True, 0.0
+        progress.has_begun, progress.waited, progress.lost = True, 0.0, 0.0
         progress.area_before = progress.area_looked_at = self._area
         if self._guard.is_until_through:
             progress.n_before = self._n_pieces()
 
-    def _yield_to_force(self, step: float) -> None:
-        """Go slower the nearer the force is to its limit, and stop when too much time is lost."""
+    def _follow_line(self, course: SkinCourse, step: float) -> None:
+        """Go on along a line for a time [s], and stop when the tissue goes along for too long."""
+        progress, guard = self.progress, self._guard
+        before = progress.at
+        self._pursuit.go(progress.part, course, guard.end, step)
+        progress.enter(GOING)  # from there
+        progress.lost += max(step - (progress.at - before), 0.0)
+        if progress.lost > LONGEST_PURSUIT * (guard.end - guard.begin):
+            self._end(DRAGGED, ENDED)
+
+    def _yield_to_force(self, step: float) -> float:
+        """Return the time [s] that is left of a step.
+
+        It goes slower the nearer the force is to its limit, and stops when too much time is lost.
+        """
         progress, guard = self.progress, self._guard
         room = (guard.force_limit - progress.force) / ((1.0 - SLOWER_FROM) * guard.force_limit)
         if room >= 1.0:
-            return
+            return step
         rate = max(room, 0.0)
         progress.waited += (1.0 - rate) * step
-        progress.at += rate * step
-        progress.enter(GOING)  # from there
+        if guard.course is None:
+            progress.at += rate * step
+            progress.enter(GOING)  # from there
         if progress.waited > guard.patience:
             self._end(GAVE_UP, ENDED)
+        return rate * step
 
     def _end(self, how: str, mode: str, is_new: bool = True) -> None:
         """Note how a stroke has ended, and enter a mode if that is new."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scalpel_sim.instruments.driven_grasper import GripSettings
-from scalpel_sim.instruments.guarded_follower import GAVE_UP, THROUGH
+from scalpel_sim.instruments.guarded_follower import DRAGGED, GAVE_UP, THROUGH
 from scalpel_sim.output.cut_account import (
     MOST,
     Stretch,
@@ -84,7 +84,7 @@ def _untouched(outcome: RunOutcome) -> Iterator[RunWarning]:
 
 
 def _limited(outcome: RunOutcome) -> Iterator[RunWarning]:
-    """Warn of strokes that were to part the body and have not, or gave up at a limit of force."""
+    """Warn of strokes that were to part the body and have not, or gave up."""
     kinds = [each["kind"] for each in outcome.settings.get("strokes", ())]
     if outcome.status != COMPLETE or outcome.stroke.is_led:
         return
@@ -98,6 +98,8 @@ def _limited(outcome: RunOutcome) -> Iterator[RunWarning]:
         elif end is not None and end.how == GAVE_UP:
             kind, problem = "gave_up", f"waited for the force to fall below {guard.force_limit:g} N"
             problem += f" and {how}"
+        elif end is not None and end.how == DRAGGED:
+            kind, problem = "dragged", f"{how}: hold the body, or let a second hand hold it taut"
         else:
             continue
         why, figures = _reasons(outcome)

@@ -41,21 +41,25 @@ def stroke_through(
         check_positive("speed", row.speed, "m/s")
         check_positive("depth", row.depth, "m")
     paths = [STROKES[row.kind].plan(row, body) for row in strokes]
-    if any(row.force_limit or row.until for row in strokes):
+    if any(
+        row.force_limit or row.until or path.course
+        for row, path in zip(strokes, paths, strict=True)
+    ):
         for row, path in zip(strokes, paths, strict=True):
-            path.guards = (_guard(row, path.duration),)
+            path.guards = (_guard(row, path),)
     return in_turn(paths, [(row.wait, row.pause) for row in strokes], mesh)
 
 
-def _guard(row: StrokeTable, duration: float) -> Guard:
+def _guard(row: StrokeTable, path: Stroke) -> Guard:
     """Return what may end the stroke of a row otherwise than planned."""
     return Guard(
         0.0,
-        duration,
+        path.duration,
         force_limit=math.inf if row.force_limit is None else row.force_limit,
         at_limit=row.at_limit or "stop",
         patience=DEFAULT_PATIENCE if row.patience is None else row.patience,
         is_until_through=row.until is not None,
+        course=path.course,
     )
 
 

@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,15 +23,30 @@ SHARPEST_BEND = math.radians(20.0)
 """Turn of the line at a point from which the blade rests there and turns [rad]; else it passes."""
 
 
-def lines_on_skin(points: FloatArray, skin: BodySkin, edge: FloatArray) -> list[FloatArray]:
-    """Return the line on the skin, parted at its corners: places [m], shape (n, 3) each.
+class SkinLine(NamedTuple):
+    """Places on the skin."""
+
+    at_rest: FloatArray
+    """Where they are in the body at rest [m], shape (n, 3)."""
+    lying: FloatArray
+    """Where they are in the body as it lies [m], shape (n, 3)."""
+
+    def joined_to(self, other: "SkinLine") -> "SkinLine":
+        """Return the line that goes on with another, which begins at its end."""
+        return SkinLine(
+            *(np.vstack([mine, its[1:]]) for mine, its in zip(self, other, strict=True))
+        )
+
+
+def lines_on_skin(points: FloatArray, skin: BodySkin, edge: FloatArray) -> list[SkinLine]:
+    """Return the line on the skin, parted at its corners.
 
     Args:
         points: Points near the skin, at rest [m], shape (n_points, 3).
         skin: The skin.
         edge: Unit vector against the depth, shape (3,).
     """
-    lines: list[FloatArray] = []
+    lines: list[SkinLine] = []
     before: FloatArray | None = None
     for i, (start, end) in enumerate(pairwise(points)):
         way = end - start - float((end - start) @ edge) * edge
@@ -42,7 +58,7 @@ def lines_on_skin(points: FloatArray, skin: BodySkin, edge: FloatArray) -> list[
             )
         line = _straight_line(np.stack([start, end]), skin, edge, i + 1, length)
         if before is not None and float(before @ way) >= math.cos(SHARPEST_BEND) * length:
-            lines[-1] = np.vstack([lines[-1], line[1:]])
+            lines[-1] = lines[-1].joined_to(line)
         else:
             lines.append(line)
         before = way / length
@@ -51,8 +67,8 @@ def lines_on_skin(points: FloatArray, skin: BodySkin, edge: FloatArray) -> list[
 
 def _straight_line(
     ends: FloatArray, skin: BodySkin, edge: FloatArray, number: int, length: float
-) -> FloatArray:
-    """Return the line between two points on the skin of the body as it lies [m], shape (n, 3).
+) -> SkinLine:
+    """Return the line between two points on the skin.
 
     Args:
         ends: The points, at rest [m], shape (2, 3).
@@ -86,7 +102,7 @@ def _straight_line(
             "there means nothing. Give an edge that stands on the skin, or keep the line away from "
             "the rim"
         )
-    return lying
+    return SkinLine(at_rest, lying)
 
 
 def _millimetres(point: FloatArray) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from scalpel_sim.strokes.csv_lines import StrokeError, numbered_lines, numbers_of
 from scalpel_sim.strokes.guard import Guard
+from scalpel_sim.strokes.skin_course import SkinCourse
 from tissue import BladeSegment, FloatArray
 
 _SAME_LENGTH = 0.01
@@ -39,6 +40,7 @@ class Stroke:
         name: For messages and reports.
         asked: Intervals in which the edge passes what it is to cut [s]; None where it is not known.
         guards: What may end each of the strokes in turn otherwise; none where nothing may.
+        course: The line on the skin that it follows as that lies; None: it goes as planned.
         is_led: Whether a person leads it, or has led it.
 
     Raises:
@@ -55,11 +57,15 @@ class Stroke:
         *,
         asked: Sequence[tuple[float, float]] | None = None,
         guards: Sequence[Guard] = (),
+        course: SkinCourse | None = None,
         is_led: bool = False,
     ) -> None:
         self.name = name
         self.guards = tuple(guards)
         """Guards that may end each of the strokes in turn; none where there are none."""
+        self.course = course
+        """The line on the skin that it follows as that lies, of one stroke alone; those of several
+        in turn are in their guards."""
         self.is_led = is_led
         """Whether a person leads it, or has led it: the arm then stands where it reaches all
         around the body, wherever that stroke goes."""

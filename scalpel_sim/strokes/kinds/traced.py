@@ -1,5 +1,8 @@
 """A cut along a line on the skin: the tip follows it at one depth, and the edge turns with it.
 
+The path is that in a body that does not give way; its course is the line, which the blade follows
+as that lies: see `instruments.line_pursuit`.
+
 heel |          | |          the edge stands along the depth, and what it sweeps is the line
      |    __----+-+----      on the skin, drawn out to the depth
 -----+----      | |    ----- skin
@@ -13,9 +16,10 @@ import numpy as np
 
 from scalpel_sim.strokes.drawn import edge_direction, missing_points, seconds_to_turn
 from scalpel_sim.strokes.kind import LyingBody, StrokeTable, stroke_kind
-from scalpel_sim.strokes.kinds.incision import drag_of, usual_depth
+from scalpel_sim.strokes.kinds.incision import usual_depth
 from scalpel_sim.strokes.skin import BodySkin
-from scalpel_sim.strokes.skin_line import lines_on_skin
+from scalpel_sim.strokes.skin_course import SkinCourse
+from scalpel_sim.strokes.skin_line import SkinLine, lines_on_skin
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import timed
 from tissue import BladeSegment, FloatArray
@@ -51,7 +55,8 @@ class _Leg(NamedTuple):
 
 @stroke_kind(
     "a cut along a line on the skin: the tip goes in along the edge at the first point, follows "
-    "the line at one depth while the edge turns with it, and is drawn out at the last",
+    "the line, as it lies then, at one depth while the edge turns with it, and is drawn out at the "
+    "last",
     ("points",),
     ("depth", "edge", "length", "speed"),
     problem=missing_points,
@@ -69,22 +74,41 @@ def traced(row: StrokeTable, body: LyingBody) -> Stroke:
     depth = usual_depth(body.mesh) if row.depth is None else row.depth
     skin = BodySkin.of(body.mesh, body.rest)
     rise = (depth + _GAP) * edge
-    legs = [_leg(line - depth * edge) for line in lines_on_skin(np.array(row.points), skin, edge)]
-    drag = drag_of(body.material)
-    first, last = legs[0], _drawn_on(legs[-1], drag)
+    lines = lines_on_skin(np.array(row.points), skin, edge)
+    legs = [_leg(line.lying - depth * edge) for line in lines]
+    first, last = legs[0], legs[-1]
     into = _Leg(np.stack([first.tips[0] + rise, first.tips[0]]), first.forwards[[0, 0]])
     out = _Leg(np.stack([last.tips[-1], last.tips[-1] + rise]), last.forwards[[-1, -1]])
-    times, tips, forwards = _followed([into, *legs[:-1], last, out], row.tip_speed)
+    path = _followed([into, *legs, out], row.tip_speed)
     length = max(_REACH * depth, depth + _LEAST_REACH) if row.length is None else row.length
     poses = [
         BladeSegment(tip, tip + length * edge, forward)
-        for tip, forward in zip(tips, forwards, strict=True)
+        for tip, forward in zip(path.tips, path.forwards, strict=True)
     ]
-    drawn, done = timed(last.length, row.tip_speed)
-    way_out, _ = timed(out.length, row.tip_speed)
-    drawn_on = drawn[-1] - np.interp(last.length - drag, done, drawn)
-    asked_until = float(times[-1] - way_out[-1] - drawn_on)
-    return Stroke(times, poses, row.kind, asked=[(0.0, asked_until)])
+    asked = [(0.0, path.begun[-1])]
+    course = _course(lines, path.begun[1:-1], row.tip_speed)
+    return Stroke(path.times, poses, row.kind, asked=asked, course=course)
+
+
+def _course(lines: list[SkinLine], begun: list[float], speed: float) -> SkinCourse:
+    """Return where the skin is above the tip, and when.
+
+    Args:
+        lines: The line on the skin, parted at its corners.
+        begun: When the tip begins to go along each [s].
+        speed: Speed between the ramps [m/s].
+    """
+    whens = []
+    for line, begin in zip(lines, begun, strict=True):
+        along = _Leg(line.lying, line.lying).along
+        times, done = timed(float(along[-1]), speed)
+        whens.append(begin + np.interp(along, done, times))
+    return SkinCourse(
+        np.concatenate(whens),
+        np.vstack([line.at_rest for line in lines]),
+        np.vstack([line.lying for line in lines]),
+        speed,
+    )
 
 
 def _leg(line: FloatArray) -> _Leg:
@@ -101,22 +125,28 @@ def _leg(line: FloatArray) -> _Leg:
     return _Leg(line, forwards / np.linalg.norm(forwards, axis=1)[:, None])
 
 
-def _drawn_on(leg: _Leg, farther: float) -> _Leg:
-    """Return a leg whose tip goes on beyond its end, straight ahead [m]."""
-    end, ahead = leg.tips[-1], leg.forwards[-1]
-    return _Leg(np.vstack([leg.tips, end + farther * ahead]), np.vstack([leg.forwards, ahead]))
+class _Path(NamedTuple):
+    """The way of the tip over time."""
+
+    times: FloatArray
+    """When it is where [s], shape (n,)."""
+    tips: FloatArray
+    """Where it is then [m], shape (n, 3)."""
+    forwards: FloatArray
+    """Direction of the cut then, shape (n, 3)."""
+    begun: list[float]
+    """When each leg begins [s]."""
 
 
-def _followed(legs: list[_Leg], speed: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times [s], places of the tip [m] and directions of the cut along legs.
-
-    Between legs the tip rests, and the blade turns.
+def _followed(legs: list[_Leg], speed: float) -> _Path:
+    """Return the way along legs. Between them the tip rests, and the blade turns.
 
     Args:
         legs: Each begins where the one before it ends.
         speed: Speed between the ramps [m/s].
     """
     times, tips, forwards = [np.zeros(1)], [legs[0].tips[:1]], [legs[0].forwards[:1]]
+    begun = []
     for leg in legs:
         now, turn = times[-1][-1:], seconds_to_turn(forwards[-1][-1], leg.forwards[0])
         if turn > 0.0:
@@ -126,6 +156,7 @@ def _followed(legs: list[_Leg], speed: float) -> tuple[FloatArray, FloatArray, F
                 [*tips, leg.tips[:1]],
                 [*forwards, leg.forwards[:1]],
             )
+        begun.append(float(now[0]))
         along = leg.along
         when, done = timed(leg.length, speed)
         times.append(now + when[1:])
@@ -133,4 +164,4 @@ def _followed(legs: list[_Leg], speed: float) -> tuple[FloatArray, FloatArray, F
             rows.append(
                 np.stack([np.interp(done[1:], along, known[:, k]) for k in range(3)], axis=1)
             )
-    return np.concatenate(times), np.concatenate(tips), np.concatenate(forwards)
+    return _Path(np.concatenate(times), np.concatenate(tips), np.concatenate(forwards), begun)
