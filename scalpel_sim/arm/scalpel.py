@@ -75,7 +75,7 @@ def add_scalpel(
 def _scalpel(blade: BladeShape, length: float) -> mujoco.MjSpec:
     """Return a scalpel whose handle and edge point along +y, and that cuts towards -z.
 
-    Its mass does not hang on how the model computes masses.
+    Its mass does not depend on how the model computes masses.
     """
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body(name="handle", gravcomp=1.0)

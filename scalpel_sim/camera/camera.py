@@ -157,8 +157,8 @@ class Camera:
         """Numbers of a segmentation by the names of what they stand for.
 
         0 is `nothing`; then `skin` and `cut`, or the outside of each label by its name and its cut
-        faces as `cut NAME`; then `blade`, each grasper by its name, `arm` and `world`. They hang
-        on the scene, and not on what is in the image.
+        faces as `cut NAME`; then `blade`, each grasper by its name, `arm` and `world`. They
+        depend on the scene, and not on what is in the image.
         """
         return MappingProxyType(self._stage.identities.table)
 

@@ -59,7 +59,7 @@ def identity_table(parts: Sequence[str], graspers: Iterable[str]) -> IdentityTab
 class Identities:
     """Numbers of what cameras see: tissue, blade, graspers, the rest of the arms, the world.
 
-    They hang on the model and on the labels of the body, and not on what is in a picture.
+    They depend on the model and on the labels of the body, and not on what is in a picture.
 
     Args:
         theatre: What they see.

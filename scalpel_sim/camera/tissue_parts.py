@@ -1,6 +1,6 @@
 """The surface of a body as textured meshes: one for the skin of each label, one for its cut faces.
 
-What hangs on the triangles alone is kept until a cut changes them: while a body only deforms, a
+What depends on the triangles alone is kept until a cut changes them: while a body only deforms, a
 picture needs new positions and normals.
 """
 

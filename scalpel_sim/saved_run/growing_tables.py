@@ -12,12 +12,17 @@ import numpy.typing as npt
 
 from scalpel_sim.errors import writing
 from scalpel_sim.file_lock import take_lock
-from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, Describe, GrowingTable, LaidOutFile
+from scalpel_sim.saved_run.preallocated_file import (
+    STEP_TIMES,
+    Describe,
+    GrowingTable,
+    PreallocatedFile,
+)
 from tissue.support import remove_unfinished, whole_file
 
 NEARLY_FULL = 0.6
-"""Share of its room that a table may use before more is made. Meanwhile the others must last: a
-copy takes seconds, and the room is that of half a minute or more."""
+"""Share of its capacity that a table may use before a larger file is made. Meanwhile the rest must
+last: a copy takes seconds, and the capacity is that of half a minute or more."""
 
 _log = logging.getLogger(__name__)
 
@@ -30,18 +35,18 @@ _UNFINISHED = ".part"
 
 @dataclass
 class _Growth:
-    """A file with more room that a thread makes."""
+    """A larger file that a thread makes."""
 
-    file: "Future[LaidOutFile]"
+    file: "Future[PreallocatedFile]"
     copied: dict[str, int]
     """Rows of each table that it has, of those that are still the same."""
 
 
 class GrowingTables:
-    """Tables to which rows are added: see `LaidOutFile`.
+    """Tables to which rows are added: see `PreallocatedFile`.
 
-    The file appears under its name with the first step. Before the room of a table is used up, a
-    thread lays out a file with twice as much, which then replaces it: nothing waits for the copy.
+    The file appears under its name with the first step. Before the capacity of a table is used up,
+    a thread lays out a file with twice as much, which then replaces it: nothing waits for the copy.
 
     Until it is closed no other run can write the file.
 
@@ -108,7 +113,7 @@ class GrowingTables:
         numbers = np.ascontiguousarray(rows, table.kind).reshape(-1, *table.width)
         end = first + len(numbers)
         with writing(self.path, _INSTEAD):
-            while not self._file.has_room(name, end):
+            while not self._file.has_capacity(name, end):
                 if self._growth is None:
                     self._begin_growth({name: end})
                 self._end_growth()
@@ -168,7 +173,7 @@ class GrowingTables:
             self._put_in_place()
 
     def finish(self) -> None:
-        """Close the file, and take the room that is left out of it.
+        """Close the file, and take spare capacity out of it.
 
         Where the system refuses, that is logged, and the file stays as it is, with all steps.
         """
@@ -176,10 +181,10 @@ class GrowingTables:
         self._end_writing()
         try:
             if is_in_place:
-                self._leave_out_room(starts)
+                self._drop_spare_capacity(starts)
         except OSError as error:
             _log.warning(
-                "%s: is complete, but cannot be written anew without the room that was not used "
+                "%s: is complete, but cannot be written anew without the space that was not used "
                 "(%s): it looks larger than it is",
                 self.path,
                 error.strerror or error,
@@ -187,11 +192,11 @@ class GrowingTables:
         finally:
             self._release()
 
-    def _leave_out_room(self, starts: Mapping[str, int]) -> None:
-        """Write the file anew without room in its tables, which begin there [bytes]."""
-        exact = [each._replace(room=self._lengths[name]) for name, each in self._tables.items()]
+    def _drop_spare_capacity(self, starts: Mapping[str, int]) -> None:
+        """Write the file anew without spare capacity; its tables begin there [bytes]."""
+        exact = [each._replace(capacity=self._lengths[name]) for name, each in self._tables.items()]
         with whole_file(self.path) as unfinished:
-            file = LaidOutFile(unfinished, exact, self._describe)
+            file = PreallocatedFile(unfinished, exact, self._describe)
             try:
                 file.copy(self.path, starts, self._lengths)
                 file.show(self._lengths)
@@ -225,18 +230,20 @@ class GrowingTables:
 
     @property
     def _is_nearly_full(self) -> bool:
-        """Whether a table has little room left."""
-        return any(n > NEARLY_FULL * self._tables[name].room for name, n in self._lengths.items())
+        """Whether a table has little capacity left."""
+        return any(
+            n > NEARLY_FULL * self._tables[name].capacity for name, n in self._lengths.items()
+        )
 
     def _next_path(self) -> Path:
         """Return a name of a file that is not in place."""
         self._n_files += 1
         return self.path.with_name(f".{self.path.name}.{os.getpid()}-{self._n_files}{_UNFINISHED}")
 
-    def _new_file(self, path: Path) -> LaidOutFile:
+    def _new_file(self, path: Path) -> PreallocatedFile:
         """Lay out a file; where that fails, there is none."""
         try:
-            return LaidOutFile(path, self._tables.values(), self._describe)
+            return PreallocatedFile(path, self._tables.values(), self._describe)
         except BaseException:
             path.unlink(missing_ok=True)
             raise
@@ -247,30 +254,30 @@ class GrowingTables:
             self._file.move_to(self.path)
 
     def _reserve(self, n_rows: Mapping[str, int]) -> None:
-        """Double the room of tables, in the next file, until they take so many rows."""
+        """Double the capacity of tables, in the next file, until they take so many rows."""
         for name, n in n_rows.items():
-            room = max(self._tables[name].room, 1)
-            while room < n:
-                room *= 2
-            self._tables[name] = self._tables[name]._replace(room=room)
+            capacity = max(self._tables[name].capacity, 1)
+            while capacity < n:
+                capacity *= 2
+            self._tables[name] = self._tables[name]._replace(capacity=capacity)
 
     def _begin_growth(self, n_rows: Mapping[str, int]) -> None:
-        """Begin to make a file with more room.
+        """Begin to make a larger file.
 
         Args:
-            n_rows: Rows that there must be room for in some tables.
+            n_rows: Rows that some tables must be able to take.
         """
         nearly = {
-            name: 2 * each.room
+            name: 2 * each.capacity
             for name, each in self._tables.items()
-            if self._lengths[name] > NEARLY_FULL * each.room
+            if self._lengths[name] > NEARLY_FULL * each.capacity
         }
         self._reserve(nearly)
         self._reserve(n_rows)
         path, source, starts = self._next_path(), self._file.path, self._file.starts
         copied = dict(self._lengths)
 
-        def grown() -> LaidOutFile:
+        def grown() -> PreallocatedFile:
             file = self._new_file(path)
             try:
                 file.copy(source, starts, copied)
@@ -283,7 +290,7 @@ class GrowingTables:
         self._growth = _Growth(self._thread.submit(grown), copied)
 
     def _end_growth(self) -> None:
-        """Continue in the file with more room, once it is made."""
+        """Continue in the larger file, once it is made."""
         assert self._growth is not None
         growth, self._growth = self._growth, None
         file, old = growth.file.result(), self._file

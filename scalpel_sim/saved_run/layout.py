@@ -10,7 +10,7 @@ rows of `forces.csv`, and the scene; VTK passes over it.
 
 from typing import NamedTuple
 
-from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, STEPS, GrowingTable
+from scalpel_sim.saved_run.preallocated_file import STEP_TIMES, STEPS, GrowingTable
 from tissue import Energies
 
 VTK = "VTKHDF"
@@ -108,12 +108,12 @@ CONTACTS = Field("contacts", "f8", (6,))
 """Points at which the tissue acts on the blade [m] and the forces on it there [N], world frame."""
 
 
-def step_fields(n_bodies: int, n_hands: int, n_cameras: int) -> tuple[Field, ...]:
+def step_fields(n_bodies: int, n_graspers: int, n_cameras: int) -> tuple[Field, ...]:
     """Return what each step has besides the body: see `docs/recordings.md`.
 
     Args:
         n_bodies: Bodies of the arm's model.
-        n_hands: Graspers.
+        n_graspers: Graspers.
         n_cameras: Cameras of the arm's model.
     """
     return (
@@ -124,7 +124,7 @@ def step_fields(n_bodies: int, n_hands: int, n_cameras: int) -> tuple[Field, ...
         Field("steps/cut_area", "f8"),
         Field("steps/force_parts", "f8", (9,)),
         Field("steps/energies", "f8", (len(Energies._fields),)),
-        *([Field("steps/hand_forces", "f8", (n_hands, 3))] if n_hands else []),
+        *([Field("steps/grasper_forces", "f8", (n_graspers, 3))] if n_graspers else []),
         *([Field("steps/cameras", "f8", (n_cameras, 7))] if n_cameras else []),
         *(Field(f"steps/{each.name}", "i8", (2,)) for each in (*SURFACE_FIELDS, CONTACTS)),
         Field("steps/rows", "i8"),
@@ -139,7 +139,7 @@ ENDS = f"{OWN}/ends"
 
 
 class Sizes(NamedTuple):
-    """Sizes of a run, from which the first room of its tables follows."""
+    """Sizes of a run, from which the first capacities of its tables follow."""
 
     n_steps: int
     """Steps that are expected."""
@@ -149,7 +149,7 @@ class Sizes(NamedTuple):
     """Tetrahedra at the start."""
     n_bodies: int
     """Bodies of the arm's model."""
-    n_hands: int
+    n_graspers: int
     """Graspers."""
     n_cameras: int
     """Cameras of the arm's model."""
@@ -160,13 +160,13 @@ class Sizes(NamedTuple):
 
 
 GROWTH = 2
-"""Size of a mesh that was cut over its size before, for which there is room."""
+"""Size of a mesh that was cut over its size before, for which there is capacity."""
 
 
 def tables_of(sizes: Sizes) -> tuple[GrowingTable, ...]:
-    """Return the tables of a run, with room for what is expected of it."""
+    """Return the tables of a run, with capacity for what is expected of it."""
     n, points, cells = sizes.n_steps, GROWTH * sizes.n_points, GROWTH * sizes.n_cells
-    own = step_fields(sizes.n_bodies, sizes.n_hands, sizes.n_cameras)
+    own = step_fields(sizes.n_bodies, sizes.n_graspers, sizes.n_cameras)
     fields = [("PointData", each, points) for each in POINT_FIELDS]
     fields += [("CellData", each, cells) for each in CELL_FIELDS]
     found = [

@@ -49,7 +49,7 @@ def scene_state(run: SavedRun, step: SavedStep) -> SceneState:
         ForceParts(*step.force_parts),
         [
             (name, float((force @ force) ** 0.5))
-            for name, force in zip(run.graspers, step.hand_forces, strict=True)
+            for name, force in zip(run.graspers, step.grasper_forces, strict=True)
         ],
         step.energies,
     )

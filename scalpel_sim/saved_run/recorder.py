@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from bridge import InProcessLink
 from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.saved_run.arm_rows import contact_rows, poses_and_forces
 from scalpel_sim.saved_run.body_writer import BodyWriter
 from scalpel_sim.saved_run.growing_tables import GrowingTables
-from scalpel_sim.saved_run.instant import contact_rows, poses_and_forces
-from scalpel_sim.saved_run.laid_out_file import STEP_TIMES
 from scalpel_sim.saved_run.layout import (
     CONTACTS,
     ENDS,
@@ -29,6 +28,7 @@ from scalpel_sim.saved_run.layout import (
     Sizes,
     tables_of,
 )
+from scalpel_sim.saved_run.preallocated_file import STEP_TIMES
 from scalpel_sim.saved_run.stage import rows_of, stage_of
 from scalpel_sim.scene.write import scene_text
 from scalpel_sim.simulation import Simulation
@@ -42,7 +42,7 @@ STEPS_PER_SECOND = 25.0
 """Steps in a second of simulated time: as many as pages and films show."""
 
 USUAL_SECONDS = 30.0
-"""Length of a run of which none is known [s]: for so long there is room at first."""
+"""Length of a run of which none is known [s]: for so long the first file lasts."""
 
 _log = logging.getLogger(__name__)
 
@@ -50,7 +50,7 @@ _log = logging.getLogger(__name__)
 class RunRecorder:
     """Writes a simulation to one file, which ParaView plays: see `docs/recordings.md`.
 
-    The state at the begin is the first step; a step follows every 40 ms of simulated time, and one
+    The state at the start is the first step; a step follows every 40 ms of simulated time, and one
     at the end. A step is in the file as soon as its frame is done, and if the process is killed the
     file has all steps before. Where the simulation goes back, so does the recording.
 

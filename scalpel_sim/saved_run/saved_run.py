@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.saved_run.laid_out_file import STEP_TIMES
 from scalpel_sim.saved_run.layout import (
     CONNECTIVITY,
     CONNECTIVITY_OFFSETS,
@@ -26,6 +25,7 @@ from scalpel_sim.saved_run.layout import (
     field_offsets,
     field_table,
 )
+from scalpel_sim.saved_run.preallocated_file import STEP_TIMES
 from scalpel_sim.saved_run.saved_step import SavedStep
 from scalpel_sim.saved_run.stage import Stage, frame_from
 from scalpel_sim.scene.read import SceneFile, scene_in
@@ -217,7 +217,7 @@ class SavedRun:
             self._own(f"steps/{name}", i).reshape(3, 3) for name in ("wrench", "blade")
         )
         energies = self._own("steps/energies", i)
-        hands = self._own("steps/hand_forces", i) if self.graspers else np.empty((0, 3))
+        hands = self._own("steps/grasper_forces", i) if self.graspers else np.empty((0, 3))
         has_cameras = f"{OWN}/steps/cameras" in self._file
         cameras = self._own("steps/cameras", i) if has_cameras else np.empty((0, 7))
         contacts = self._span("contacts", i)
@@ -240,7 +240,7 @@ class SavedRun:
             cut_area=float(self._own("steps/cut_area", i)),
             force_parts=self._own("steps/force_parts", i).reshape(3, 3),
             energies=None if np.isnan(energies).any() else Energies(*energies.tolist()),
-            hand_forces=hands,
+            grasper_forces=hands,
             contact_points=contacts[:, :3],
             contact_forces=contacts[:, 3:],
         )

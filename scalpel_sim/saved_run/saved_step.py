@@ -49,7 +49,7 @@ class SavedStep(NamedTuple):
     tissue frame, shape (3, 3); NaN before the first frame."""
     energies: Energies | None
     """Energy balance; None without an audit."""
-    hand_forces: FloatArray
+    grasper_forces: FloatArray
     """Force of the tissue on each grasper [N], world frame, shape (n_graspers, 3)."""
     contact_points: FloatArray
     """Points at which the tissue acts on the blade [m], world frame, shape (n, 3)."""

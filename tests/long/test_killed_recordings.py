@@ -13,7 +13,7 @@ import pytest
 
 from scalpel_sim import SavedRun
 from scalpel_sim.saved_run.growing_tables import GrowingTables
-from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, GrowingTable
+from scalpel_sim.saved_run.preallocated_file import STEP_TIMES, GrowingTable
 from tests.long.forked_runs import ForkedRuns, count_in
 from tests.support.battery import battery
 from tests.support.vtk_steps import VtkSteps

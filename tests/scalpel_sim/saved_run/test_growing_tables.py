@@ -11,7 +11,7 @@ import pytest
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.saved_run.growing_tables import GrowingTables
-from scalpel_sim.saved_run.laid_out_file import STEP_TIMES, GrowingTable
+from scalpel_sim.saved_run.preallocated_file import STEP_TIMES, GrowingTable
 
 ROOT = Path(__file__).parents[3]
 
@@ -19,7 +19,7 @@ PATIENCE = 30.0
 """How long a thread may take to copy some kilobytes [s]: the machine may be busy."""
 
 TABLES = (
-    GrowingTable(STEP_TIMES, "f8", room=2),
+    GrowingTable(STEP_TIMES, "f8", capacity=2),
     GrowingTable("own/pairs", "f4", (2,)),
     GrowingTable("own/empty", "i8"),
 )
@@ -95,8 +95,8 @@ def test_steps_that_are_taken_off_are_written_again(tables):
 
 
 def test_more_room_is_made_before_there_is_none_and_steps_go_on_meanwhile(tmp_path):
-    roomy = tuple(each._replace(room=400) for each in TABLES)
-    tables = GrowingTables(tmp_path / "run.vtkhdf", roomy, lambda _: None)
+    large = tuple(each._replace(capacity=400) for each in TABLES)
+    tables = GrowingTables(tmp_path / "run.vtkhdf", large, lambda _: None)
     lengths = []
     for i in range(24):  # 276 pairs: more than six tenths
         add_step(tables, i)
@@ -122,8 +122,8 @@ def test_more_room_is_made_before_there_is_none_and_steps_go_on_meanwhile(tmp_pa
 
 
 def test_a_recording_that_ends_while_room_is_made_leaves_one_file(tmp_path):
-    roomy = tuple(each._replace(room=400) for each in TABLES)
-    tables = GrowingTables(tmp_path / "run.vtkhdf", roomy, lambda _: None)
+    large = tuple(each._replace(capacity=400) for each in TABLES)
+    tables = GrowingTables(tmp_path / "run.vtkhdf", large, lambda _: None)
     for i in range(24):
         add_step(tables, i)
         tables.commit()

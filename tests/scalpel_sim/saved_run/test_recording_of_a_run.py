@@ -114,10 +114,10 @@ def test_a_saved_run_has_surface_arm_and_forces_of_each_step(recorded, run):
         assert step.cut_area == truth.readings.cut_area
         assert np.array_equal(step.contact_points, truth.readings.contact_points)
         assert np.array_equal(step.contact_forces, truth.readings.contact_forces)
-        hands = [np.linalg.norm(force) for force in step.hand_forces]
+        hands = [np.linalg.norm(force) for force in step.grasper_forces]
         assert hands == pytest.approx([force for _, force in truth.readings.hands] or [0.0])
     assert np.array_equal(run.rows, simulation.recording.rows, equal_nan=True)
-    assert max(np.linalg.norm(run.step(-1).hand_forces, axis=1)) > 0.1
+    assert max(np.linalg.norm(run.step(-1).grasper_forces, axis=1)) > 0.1
 
 
 def test_colours_of_a_step_are_those_of_the_tissue(recorded, run):

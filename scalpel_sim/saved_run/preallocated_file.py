@@ -1,8 +1,8 @@
-"""An HDF5 file with room in its tables, in which a write that nothing can divide shows a step.
+"""An HDF5 file whose tables are preallocated, in which one atomic write shows a step.
 
 HDF5 keeps no order among what it writes, and a file that is open for writing can be left
-unreadable. So h5py only lays the file out, with room in each table, and closes it. From then on
-numbers are written into that room, and after them the lengths of tables, at the places where HDF5
+unreadable. So h5py only lays the file out, with spare capacity in each table, and closes it. From
+then on numbers are written there, and after them the lengths of tables, at the places where HDF5
 has them. Last comes one write within a page of memory, which a kill cannot divide: the number of
 steps, and the length of the table of their times. Until then a reader sees the steps before.
 
@@ -39,16 +39,16 @@ _MARKER = (0x5CA1_BE15_C0FF_EE77).to_bytes(8, "little")
 """Number of steps of a file that is being laid out, by which its place is found."""
 
 _HEAD = 1 << 16
-"""Length of the begin of a file, in which that is [bytes]."""
+"""Length of the start of a file, in which that is [bytes]."""
 
 _PREFIX = struct.Struct("<BxHII4x")
-"""Begin of an object header of version 1: version, number of messages, references, length."""
+"""Start of an object header of version 1: version, number of messages, references, length."""
 
 _MESSAGE = struct.Struct("<HHB3x")
-"""Begin of a message in it: type, length, flags."""
+"""Start of a message in it: type, length, flags."""
 
 _DATASPACE = struct.Struct("<BBB5x")
-"""Begin of the message that has the shape of a table: version, dimensions, flags."""
+"""Start of the message that has the shape of a table: version, dimensions, flags."""
 
 _TYPE_OF_DATASPACE, _HAS_LARGEST = 1, 1
 """Type of that message; flag that the largest shape follows the shape."""
@@ -69,8 +69,8 @@ class GrowingTable(NamedTuple):
     """Type of its numbers, as NumPy writes it: `f4`."""
     width: tuple[int, ...] = ()
     """Shape of a row."""
-    room: int = 1
-    """Rows that there is room for at first."""
+    capacity: int = 1
+    """Rows that it can take."""
 
     @property
     def row_bytes(self) -> int:
@@ -87,12 +87,12 @@ class _Place(NamedTuple):
     """Where its shape is, followed by the largest one that it may have [bytes]."""
 
 
-class LaidOutFile:
+class PreallocatedFile:
     """A file that was laid out, and is open to write rows and their number at their places.
 
     Args:
         path: The file, which is replaced.
-        tables: The tables with their room; `STEP_TIMES` is one of them.
+        tables: The tables with their capacities; `STEP_TIMES` is one of them.
         describe: Writes what does not grow.
 
     Raises:
@@ -138,12 +138,12 @@ class LaidOutFile:
         """Number of rows of each table that readers see; -1 before the first `show`."""
         return dict(self._shown)
 
-    def has_room(self, name: str, n_rows: int) -> bool:
-        """Return whether a table has room for so many rows."""
-        return n_rows <= self._tables[name].room
+    def has_capacity(self, name: str, n_rows: int) -> bool:
+        """Return whether a table can take so many rows."""
+        return n_rows <= self._tables[name].capacity
 
     def write(self, name: str, first: int, content: bytes) -> None:
-        """Write rows of a table into its room.
+        """Write rows of a table at their place.
 
         Args:
             name: The table.
@@ -191,7 +191,7 @@ class LaidOutFile:
             if name != STEP_TIMES and length != self._shown[name]:
                 table = self._tables[name]
                 # HDF5 takes nothing of no length that has a place: an empty table shows a row.
-                shape = (max(length, min(table.room, 1)), *table.width)
+                shape = (max(length, min(table.capacity, 1)), *table.width)
                 self._write(
                     self._places[name].shape, struct.pack(f"<{2 * len(shape)}q", *shape, *shape)
                 )
@@ -268,7 +268,7 @@ def _new_table(file: "h5py.File", table: GrowingTable) -> tuple[int, int]:
     links = h5p.create(h5p.LINK_CREATE)
     links.set_create_intermediate_group(True)
     kind = h5t.py_create(np.dtype(table.kind).newbyteorder("<"))
-    space = h5s.create_simple((table.room, *table.width))
+    space = h5s.create_simple((table.capacity, *table.width))
     made = h5d.create(file.id, table.name.encode(), kind, space, how, links)
     return made.get_offset() or 0, h5o.get_info(made).addr
 

@@ -32,7 +32,7 @@ def poses_and_forces(simulation: Simulation) -> dict[str, npt.ArrayLike]:
         "steps/force_parts": parts,
         "steps/energies": np.full(len(Energies._fields), np.nan) if energies is None else energies,
         "steps/cameras": camera_poses(arm.data, perspective_cameras(arm.model)),
-        "steps/hand_forces": [each.wrench.force for each in simulation.graspers],
+        "steps/grasper_forces": [each.wrench.force for each in simulation.graspers],
     }
 
 
