@@ -145,6 +145,9 @@ class Composition:
         render, camera, scene = self.with_room(), self._camera, self.scene
         if not isinstance(view, Viewpoint):
             camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, view
+            # MuJoCo lays infinite planes around the eye before it aims it: around that of the
+            # picture before, which would show in this one.
+            mujoco.mjv_updateCamera(self._model, data, camera, scene)
         elif view is not self._aimed_at:
             camera.type = mujoco.mjtCamera.mjCAMERA_USER
             aim(scene, view, far)

@@ -95,7 +95,8 @@ def test_a_model_alone_looks_as_mujocos_own_renderer_draws_it(monkeypatch):
     canvas.close()
     model.vis.quality.offsamples, model.vis.quality.shadowsize = 0, 2048
     with mujoco.Renderer(model, 240, 320) as renderer:
-        renderer.update_scene(data, "eye")
+        for _ in range(2):  # the first time it lays infinite planes around another place
+            renderer.update_scene(data, "eye")
         renderer.enable_depth_rendering()
         its_depth = renderer.render()
         renderer.disable_depth_rendering()
@@ -112,6 +113,38 @@ def test_a_model_alone_looks_as_mujocos_own_renderer_draws_it(monkeypatch):
 
 BALL = primitives.ellipsoid(np.full(3, 0.03))
 FROM_FRONT = Viewpoint(np.array([0.0, -0.2, 0.0]), np.zeros(3))
+
+
+def test_a_picture_does_not_hang_on_those_before_it():
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    canvas, size, eye = Canvas(model, finishes={}), PixelSize(96, 72), model.camera("eye").id
+    pictures = []
+    for view in (eye, eye, FROM_FRONT, eye):
+        canvas.look(view, data)
+        pictures.append(canvas.colours(size))
+    assert (pictures[0] == pictures[1]).all() and (pictures[0] == pictures[3]).all()
+
+
+def test_a_mesh_stands_beside_the_flexes_and_skins_of_a_model():
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    model.mat_reflectance[:] = 0.0
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    canvas, size = Canvas(model, finishes={"ball": Finish((0.0, 0.0, 1.0, 1.0))}), PixelSize(96, 72)
+    canvas.look(model.camera("eye").id, data)
+    alone = canvas.colours(size)
+    canvas.put("ball", BALL, TissueFrame(origin=np.array([0.0, -0.5, 0.4])))
+    canvas.look(model.camera("eye").id, data)
+    with_ball = canvas.colours(size)
+    places, things = canvas.numbers(size)
+    kinds = {things[place].kind for place in np.unique(places) if place >= 0}
+    assert {mujoco.mjtObj.mjOBJ_FLEX, mujoco.mjtObj.mjOBJ_SKIN} <= kinds
+    is_ball = places == [thing.mesh for thing in things].index("ball")
+    assert 20 < is_ball.sum() < 1000
+    assert (with_ball[~is_ball] == alone[~is_ball]).all()
+    assert (with_ball[is_ball] != alone[is_ball]).any(axis=1).all()
 
 
 def test_a_mesh_is_drawn_where_its_frame_is_and_lit_by_the_lamps_that_are_given():
