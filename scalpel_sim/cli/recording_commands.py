@@ -46,7 +46,11 @@ def replay(
 
         page = _page_in(file) if file.is_dir() and out is None else None
         if page is None:
-            path = _recording_in(file) if file.is_dir() else file
+            otherwise = (
+                "neither a replay nor a recording; a run that was killed continues with "
+                f"`scalpel-sim run --resume {file}`"
+            )
+            path = _recording_in(file, otherwise) if file.is_dir() else file
             page = path.with_suffix(_PAGE) if out is None else out
             with SavedRun(path) as run:
                 check_exports([page], "--out", [_PAGE])
@@ -90,7 +94,8 @@ def export(
         from scalpel_sim.saved_run.exports import PVD, export_series, export_step
         from scalpel_sim.saved_run.saved_run import SavedRun
 
-        path = _recording_in(file) if file.is_dir() else file
+        otherwise = "no recording; `scalpel-sim run --record run.vtkhdf` writes one"
+        path = _recording_in(file, otherwise) if file.is_dir() else file
         is_series = out.suffix.lower() == PVD
         if is_series and at is not None:
             raise UsageError(f"a {PVD} file has all instants: leave out --at")
@@ -117,8 +122,12 @@ def _page_in(folder: Path) -> Path | None:
     return page if page.is_file() else None
 
 
-def _recording_in(folder: Path) -> Path:
+def _recording_in(folder: Path, otherwise: str) -> Path:
     """Return the one recording in a folder.
+
+    Args:
+        folder: The folder.
+        otherwise: What it has where it has none, for the message.
 
     Raises:
         UsageError: there is none, or there are several.
@@ -129,9 +138,6 @@ def _recording_in(folder: Path) -> Path:
     if len(found) == 1:
         return found[0]
     if not found:
-        raise UsageError(
-            f"{folder}: has neither a replay nor a recording; a run that was killed continues with "
-            f"`scalpel-sim run --resume {folder}`"
-        )
+        raise UsageError(f"{folder}: has {otherwise}")
     names = ", ".join(path.name for path in found)
     raise UsageError(f"{folder}: has several recordings; choose one of {names}")

@@ -48,6 +48,8 @@ def test_of_a_folder_its_replay_or_its_one_recording_is_played(recorded, tmp_pat
     assert f"{folder / 'replay.html'}: open" in capsys.readouterr().out
     assert command_line(["replay", str(tmp_path)]) == 2
     assert "has neither a replay nor a recording" in capsys.readouterr().err
+    assert command_line(["export", str(tmp_path), "-o", "x.stl"]) == 2
+    assert "has no recording; `scalpel-sim run --record run.vtkhdf`" in capsys.readouterr().err
     for name in ("a", "b"):
         (tmp_path / f"{name}.vtkhdf").touch()
     for words in (["replay", str(tmp_path)], ["export", str(tmp_path), "-o", "x.stl"]):
