@@ -4,6 +4,7 @@ import io
 import json
 import os
 import platform
+import shutil
 import subprocess
 
 import pytest
@@ -12,6 +13,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
 from scalpel_sim.runs import console
 from scalpel_sim.runs.options import PrintOptions
+from tests.support.battery import battery
 from tests.support.processes import PROGRAM, environment
 from tissue.support import LEVELS, cache_directory, n_compiled_kernels
 
@@ -37,13 +39,20 @@ def test_a_file_for_a_bundle_needs_its_level(capsys):
     assert "--target" in capsys.readouterr().err
 
 
-@pytest.mark.end_to_end
-@pytest.mark.skipif(all(level.missing() for level in LEVELS.values()), reason="of no level")
-def test_a_bundle_of_a_level_serves_a_run_in_a_fresh_home(tmp_path):
-    level = next(name for name, level in LEVELS.items() if not level.missing())
+HERE = [name for name, level in LEVELS.items() if not level.missing()]
+"""Levels that this machine reaches."""
+
+OF_A_LEVEL = pytest.mark.skipif(not HERE, reason="this machine reaches no level")
+
+
+def serve_a_run(level, cache, tmp_path):
+    """Make the bundle of a level with a cache, and expect a run in a fresh home to need no more."""
     file = tmp_path / "kernels.zip"
     command = [*PROGRAM, "warm-up", "grid2", "--target", level, "--out", file, "--json"]
-    made = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
+    places = {"NUMBA_CACHE_DIR": str(cache)}
+    made = subprocess.run(
+        command, env=environment() | places, capture_output=True, text=True, check=True
+    )
     assert json.loads(made.stdout)["programs"] > 50
     fresh = {"HOME": str(tmp_path / "home"), "SCALPEL_SIM_BUNDLE": str(file)}
     variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
@@ -56,6 +65,24 @@ def test_a_bundle_of_a_level_serves_a_run_in_a_fresh_home(tmp_path):
     )
     assert not ran.stderr
     assert not list((tmp_path / "home").rglob("*.nbc"))
+
+
+@pytest.mark.end_to_end
+@OF_A_LEVEL
+def test_a_bundle_of_a_level_serves_a_run_in_a_fresh_home(tmp_path):
+    """Of kernels for this processor in the place of those of the level, which take a minute."""
+    assert command_line(["warm-up", "grid2", "-q"]) == EXIT_OK
+    cache = tmp_path / "cache"
+    shutil.copytree(cache_directory(), cache / "kernels" / LEVELS[HERE[0]].folder.name)
+    serve_a_run(HERE[0], cache, tmp_path)
+
+
+@OF_A_LEVEL
+@battery(n_per_change=0, n_long=len(HERE))
+def test_kernels_of_each_level_serve_a_run_in_a_fresh_home(case, tmp_path):
+    here = tmp_path / HERE[case]
+    here.mkdir()
+    serve_a_run(HERE[case], here / "cache", here)
 
 
 @pytest.fixture
