@@ -47,9 +47,9 @@ class ProcessOfARun:
 class DeviceRunProcess(ProcessOfARun):
     """A run that waits for a device."""
 
-    def __init__(self, command, folder, *options):
+    def __init__(self, command, folder, *options, scene="grid2"):
         hand = ["--hand", "device", "--listen", "127.0.0.1:0"]
-        super().__init__(folder, command, "grid2", *hand, *options)
+        super().__init__(folder, command, scene, *hand, *options)
         self.address = self.line_with("waiting for a device at").split()[-1]
 
 

@@ -8,14 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from bridge import DeviceClient, LinkError, write_new_key
 from bridge.tcp.keys import read_key
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.recording.columns import shared_columns
 from scalpel_sim.recording.recording import read_forces
-from scalpel_sim.runs.file_names import FORCES, INITIAL, STROKE, SUMMARY
+from scalpel_sim.runs.file_names import FORCES, INITIAL, REPORT, STROKE, SUMMARY
+from scalpel_sim.scene.task_table import SuccessTable, TaskTable
+from scalpel_sim.scene.write import scene_text
 from tests.scalpel_sim.hands.device_runs import lead_forwards
+from tests.scalpel_sim.hands.driven_runs import GRID2
 from tests.scalpel_sim.hands.driven_view import DeviceRunProcess, assert_a_run_repeats
 
 pytestmark = pytest.mark.end_to_end
@@ -43,6 +47,30 @@ def test_devices_lead_a_cut_in_turn_until_one_ends_it_and_a_run_repeats_it_to_th
     engaged = np.genfromtxt(run.folder / STROKE, delimiter=",", names=True)["engaged"]
     assert np.count_nonzero(np.diff(engaged) > 0.0) >= 2, "it was taken hold of anew"
     assert_a_run_repeats(run.folder, tmp_path / "again")
+
+
+def test_what_a_device_did_is_scored_reported_and_repeated_with_the_same_score(tmp_path):
+    task = TaskTable(success=SuccessTable(off_plan=1e-3))
+    scene = tmp_path / "scored.toml"
+    scene.write_text(scene_text(structs.replace(GRID2, task=task, seconds=None), scene))
+    again = tmp_path / "again"
+    with DeviceRunProcess("run", tmp_path / "led", scene=str(scene)) as run:
+        with DeviceClient(run.address) as client:
+            wait_for_frames(client)
+            lead_forwards(client, 0.025)
+            client.end()
+        assert run.process.wait(60) == 0
+    summary = json.loads((run.folder / SUMMARY).read_text())
+    score = summary["score"]
+    assert score["terms"]["cut_area"] == pytest.approx(summary["cut_area_m2"], rel=1e-9)
+    assert 0.0 < score["terms"]["covered"] < 1.0
+    assert score["success"] is True
+    (blade,) = score["instruments"]
+    assert 0.015 < blade["path_length_m"] < 0.03  # from control step to control step
+    assert blade["force_n"] == pytest.approx(summary["force_peak_n"], rel=1e-9)
+    assert "Planned cut that is open" in (run.folder / REPORT).read_text()
+    assert_a_run_repeats(run.folder, again)
+    assert json.loads((again / SUMMARY).read_text())["score"] == score
 
 
 def wait_for_frames(client):

@@ -258,6 +258,21 @@ def test_a_run_says_how_much_of_a_layer_is_dissected(tmp_path, capsys):
     assert summary["work_of_blade_j"] == pytest.approx(10.0 * 0.04 * 0.02, rel=0.05)
 
 
+def test_the_areas_of_labels_and_layers_add_up_in_the_middle_of_a_cut(tmp_path):
+    """There, one face that is cut has all its nodes on the rim: it cannot open, and counts."""
+    (tmp_path / "scene.toml").write_text(TWO_PARTS)
+    out = tmp_path / "out"
+    command = ["run", str(tmp_path / "scene.toml"), "-q", "--seconds", "0.49", "--out", str(out)]
+    assert command_line(command) == EXIT_OK
+    summary = json.loads((out / "summary.json").read_text())
+    (layer,), whole = summary["interfaces"], 0.04 * 0.02
+    assert 0.1 * whole < layer["cut_area_m2"] < 0.9 * whole
+    assert layer["cut_area_m2"] == pytest.approx(summary["cut_area_m2"], rel=1e-9)
+    of_labels = [row["cut_area_m2"] for row in summary["labels"]]
+    assert sum(of_labels) == pytest.approx(summary["cut_area_m2"], rel=1e-9)
+    assert of_labels[0] == of_labels[1]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
