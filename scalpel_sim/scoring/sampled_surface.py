@@ -43,11 +43,13 @@ class SurfaceSearch:
 
     def __init__(self, surface: SampledSurface, spacing: float = PLAN_SPACING) -> None:
         self._tree = place_tree(surface.points)
-        self._normals, self._areas = (
-            surface.normals[self._tree.number],
-            surface.areas[self._tree.number],
-        )
+        in_order = self._tree.number
+        self._normals, self._areas = surface.normals[in_order], surface.areas[in_order]
         self._cell = _HALF_DIAGONAL * spacing
+        # Compiled before the first frame, as a cut would wait for it.
+        first = surface.points[[0, 0, 0]]
+        self.least_distance(first, float(self.distances(first).max()))
+        self.mark_near(first, 0.0, np.zeros(len(surface.points), bool))
 
     def distances(self, points: FloatArray) -> FloatArray:
         """Return the distances of points from the surface [m], shape (n,).

@@ -51,6 +51,7 @@ class Score:
         self.cut = CutTerms(yardstick)
         """Terms of the cut."""
         self._strains = tuple(StrainTerm(each) for each in yardstick.strains)
+        self._look_at_strain()
         self._pieces = PiecesTerm(yardstick, body, simulation.link.n_pieces())
         self._time = 0.0
         self._work = (0.0, 0.0)
@@ -98,6 +99,10 @@ class Score:
             self._n_faces += faces.n
             self.cut.take(faces)
             self._pieces.look(self._link)
+        self._look_at_strain()
+
+    def _look_at_strain(self) -> None:
+        """Look where the tissue is stretched too far now, if it is in this process."""
         if self._tissue is not None:
             for strain in self._strains:
                 strain.look(self._tissue)
