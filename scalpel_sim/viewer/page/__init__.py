@@ -91,7 +91,7 @@ def live_page(
             "hand.js",
         ]
     if choices is not None:
-        bars.append("draw")
+        bars.insert(-1, "draw")  # the bar of a small screen scrolls, and shows its begin
         panels.append("choices")
         scripts += ["choices.js", "skin_at_rest.js", "draw.js"]
     return _page(

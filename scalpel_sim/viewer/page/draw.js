@@ -20,6 +20,7 @@ class Drawing {
         this.points = []; // of the line: places at rest, and normals there
         this.gestures = []; // how many points the line had before each tap and drag
         this.places = []; // of all lines on the skin of the last picture, two for each piece
+        this.nBefore = 0; // of them those of lines that are cut in this run
         this.isOff = false; // whether the line leaves the skin
         this.index = null; // of the skin on which the places are
         this.depth = null; // [m]
@@ -27,8 +28,11 @@ class Drawing {
         this.cursor = null; // where the keys point [pixels of the pane]
         this.fingers = new TwoFingers(view.viewer);
         this.bands = [band("halo of the drawing", HALO, 0.9, 1), band("drawing", PLANNED, 1, 2)];
+        this.sheet = band("depth of the drawing", PLANNED, 0.35, 3);
+        this.bottom = band("bottom of the drawing", PLANNED, 0.9, 3);
+        for (const each of [this.sheet, this.bottom]) each.material.depthTest = false; // they are in the body, and show through
         this.dots = new THREE.Group();
-        view.viewer.scene.add(...this.bands, this.dots);
+        view.viewer.scene.add(...this.bands, this.sheet, this.bottom, this.dots);
         document.querySelector("#looks").before(element("draw"));
         element("meshcat-pane").append(element("draw-cursor"));
         element("draw-mode").addEventListener("click", () => this.toggle());
@@ -68,6 +72,7 @@ class Drawing {
     setDepth(metres) {
         this.depth = metres;
         element("draw-depth").value = 1e3 * metres;
+        this.paint();
         this.showPanel();
     }
 
@@ -215,6 +220,7 @@ class Drawing {
         const before = planLine.isThere ? [] : this.before; // as the plan they are drawn already
         this.places = before.flatMap(({ points, edge }) => this.onSkin(points, edge).places);
         const { places, isOff } = this.onSkin(this.points.map(({ rest }) => rest), this.edge);
+        this.nBefore = this.places.length;
         this.places.push(...places);
         this.isOff = isOff;
         this.marks = this.points.map(({ rest }) => this.skin.at(rest, this.edge.map((x) => -x)));
@@ -249,6 +255,11 @@ class Drawing {
         const eye = scene.worldToLocal(camera.getWorldPosition(new THREE.Vector3()));
         const ends = this.places.map(inScene);
         this.bands.forEach((each, i) => each.draw(ribbon(ends, eye, this.view.extent, i === 0 ? 2.4 : 1.3)));
+        const down = new THREE.Vector3(...this.edge).multiplyScalar(-(this.depth ?? 0));
+        const [origin, end] = [new THREE.Vector3(), down].map((each) => each.clone().applyMatrix4(toScene));
+        const top = ends.slice(this.nBefore), way = end.sub(origin);
+        this.sheet.draw(hanging(top, way));
+        this.bottom.draw(ribbon(top.map((each) => each.clone().add(way)), eye, this.view.extent, 0.6));
         const marks = (this.marks ?? []).filter((place) => place !== null && this.points.length < 20).map(inScene);
         while (this.dots.children.length > marks.length) this.dots.remove(this.dots.children[0]);
         while (this.dots.children.length < marks.length) this.dots.add(dot());

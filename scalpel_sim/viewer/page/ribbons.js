@@ -20,6 +20,18 @@ function ribbon(ends, eye, extent, wider = 1) {
     return geometry;
 }
 
+// A sheet that hangs from a line: `ends` are two for each piece, `down` its way into the body.
+function hanging(ends, down) {
+    const corners = [];
+    for (let i = 0; i < ends.length; i += 2) {
+        const [a, b] = [ends[i], ends[i + 1]], [c, d] = [a.clone().add(down), b.clone().add(down)];
+        for (const corner of [a, c, b, b, c, d]) corners.push(corner.x, corner.y, corner.z);
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
+    return geometry;
+}
+
 // A mesh for bands of one colour, whose geometry `draw` replaces. Those of a higher order are drawn later.
 function band(name, color, opacity = 1, order = 0) {
     const mesh = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({
