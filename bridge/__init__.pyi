@@ -17,6 +17,9 @@ from .coupling.limits import DeviceLimits as DeviceLimits
 from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.virtual_coupling import Proxy as Proxy
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
+from .description import NamedLabel as NamedLabel
+from .description import SceneView as SceneView
+from .description import TissueDescription as TissueDescription
 from .device.client import DeviceClient as DeviceClient
 from .device.exchange import DeviceCommand as DeviceCommand
 from .device.felt_force import BladeReport as BladeReport
@@ -33,9 +36,6 @@ from .driven import GeomPoses as GeomPoses
 from .frames import TissueFrame as TissueFrame
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
-from .link import NamedLabel as NamedLabel
-from .link import SceneView as SceneView
-from .link import TissueDescription as TissueDescription
 from .link import TissueLink as TissueLink
 from .tcp.address import DEFAULT_HOST as DEFAULT_HOST
 from .tcp.address import DEFAULT_PORT as DEFAULT_PORT

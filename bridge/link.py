@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Protocol, TypeGuard
 
+import numpy as np
+
+from bridge.description import NamedLabel, SceneView, TissueDescription
 from bridge.driven import (
     NO_GEOM_LOADS,
     NO_GEOMS,
@@ -18,7 +21,6 @@ from bridge.driven import (
     expect_pose_of_each,
 )
 from tissue import (
-    BladeShape,
     BladeSweep,
     Chunks,
     CutFaces,
@@ -26,7 +28,7 @@ from tissue import (
     Deformation,
     FloatArray,
     Geom,
-    Material,
+    IntArray,
     Snapshot,
     StepResult,
     Surface,
@@ -40,55 +42,6 @@ if TYPE_CHECKING:  # the side without the tissue starts without its compiler
 
 class LinkError(ConnectionError):
     """The tissue cannot be reached, does not answer, or its answer cannot be read."""
-
-
-class SceneView(NamedTuple):
-    """A camera of a scene, which stands still in the frame of the tissue."""
-
-    name: str
-    """Name of it."""
-    eye: tuple[float, float, float]
-    """Where it is [m]."""
-    target: tuple[float, float, float]
-    """The point in the middle of its picture [m]."""
-    up: tuple[float, float, float]
-    """Direction that points to the upper side of the picture."""
-    fov_degrees: float
-    """Angle from the lower to the upper side of the picture."""
-
-
-class NamedLabel(NamedTuple):
-    """A label of a body, and its name."""
-
-    label: int
-    """The label."""
-    name: str
-    """Its name; empty if it has none."""
-
-
-class TissueDescription(NamedTuple):
-    """Description of a body in another process, for the side of the arm."""
-
-    scene: str
-    """Scene that was built, as the command line names it."""
-    material: Material
-    """Material of the body."""
-    bounds: FloatArray
-    """Lowest and highest corner now [m], shape (2, 3)."""
-    n_tetrahedra: int
-    """Number of tetrahedra now."""
-    n_nodes: int
-    """Number of nodes now."""
-    blade: BladeShape | None = None
-    """Shape of the blade that cuts the body; None for the paper's blade, a line."""
-    floor: float | None = None
-    """Height of the floor that pieces land on [m]; None for no floor."""
-    views: tuple[SceneView, ...] = ()
-    """Cameras of the scene; the first of them at the start."""
-    labels: tuple[NamedLabel, ...] = ()
-    """Labels of the body, in order; none of a body with one label that has no name."""
-    n_cut_faces: int = 0
-    """Number of faces that cuts have opened so far."""
 
 
 class TissueLink(Protocol):
@@ -198,6 +151,15 @@ class TissueLink(Protocol):
 
         Raises:
             ValueError: fewer faces were cut.
+        """
+
+    def positions_of(self, at_rest: FloatArray, holders: IntArray) -> FloatArray:
+        """Return where material points are now [m], shape (n, 3).
+
+        Args:
+            at_rest: Where they are in the body at rest [m], shape (n, 3).
+            holders: Tetrahedron that held each when it was looked up last, or -1; written.
+                Shape (n,).
         """
 
     def cut_report(self) -> CutReport:
@@ -353,6 +315,13 @@ class InProcessLink:
     def cut_faces(self, since: int = 0) -> CutFaces:
         """Return the faces that cuts have opened, in order; see `Tissue.cut_faces`."""
         return self._tissue.cut_faces(since)
+
+    def positions_of(self, at_rest: FloatArray, holders: IntArray) -> FloatArray:
+        """Return where material points are now [m], shape (n, 3); see `TissueLink`."""
+        from tissue import MaterialPoints  # with the compiler, which the tissue has loaded
+
+        shares = np.zeros(len(holders))
+        return self._tissue.positions_of(MaterialPoints(at_rest, holders, shares))
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""

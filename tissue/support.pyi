@@ -10,6 +10,15 @@ from .core.kernel_folder import cache_directory as cache_directory
 from .core.kernel_folder import n_compiled_kernels as n_compiled_kernels
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
+from .core.vec3 import Vec3 as Vec3
+from .core.vec3 import add as add
+from .core.vec3 import axpy as axpy
+from .core.vec3 import dot as dot
+from .core.vec3 import lerp as lerp
+from .core.vec3 import norm as norm
+from .core.vec3 import scale as scale
+from .core.vec3 import sub as sub
+from .core.vec3 import vec3 as vec3
 from .geometry.surface_places import PlaceTree as PlaceTree
 from .geometry.surface_places import deepen as deepen
 from .geometry.surface_places import least_distance as least_distance
@@ -41,14 +50,23 @@ __all__ = [
     "Memento",
     "SameTypes",
     "StateRules",
+    "Vec3",
+    "add",
+    "axpy",
     "bundle_name",
     "bundled",
     "cache_directory",
     "components",
+    "dot",
     "is_compiling",
     "likely_unit",
     "kernel",
     "labels_of_part",
+    "lerp",
+    "norm",
+    "scale",
+    "sub",
+    "vec3",
     "PlaceTree",
     "count_places",
     "deepen",

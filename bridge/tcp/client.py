@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable, Mapping, Sequence
 
+from bridge.description import TissueDescription
 from bridge.driven import (
     NO_GEOMS,
     FrameAttachment,
@@ -15,7 +16,6 @@ from bridge.driven import (
     expect_pose_of_each,
     no_geom_loads,
 )
-from bridge.link import TissueDescription
 from bridge.tcp.connection import ANSWER_SECONDS, Connection, Served
 from bridge.tcp.messages.body import (
     CHUNKS,
@@ -23,14 +23,19 @@ from bridge.tcp.messages.body import (
     CUT_REPORT,
     DEFORMATION,
     LARGEST_CHUNKS,
+    MATERIAL_POINTS,
     PIECES,
+    POINTS_NOW,
     QUANTITY,
     SINCE,
     SNAPSHOT,
     SURFACE,
     VALUES,
+    PointsAtRest,
+    PointsNow,
     cut_faces_bytes,
     deformation_bytes,
+    positions_bytes,
     snapshot_bytes,
     surface_bytes,
     values_bytes,
@@ -57,6 +62,7 @@ from tissue import (
     Deformation,
     FloatArray,
     Geom,
+    IntArray,
     Snapshot,
     StepResult,
     Surface,
@@ -233,6 +239,14 @@ class TcpLink:
         limit, request = cut_faces_bytes(n - since), SINCE.pack(since)
         return self._connection.request(MessageKind.CUT_FACES, request, limit, CUT_FACES.unpack)
 
+    def positions_of(self, at_rest: FloatArray, holders: IntArray) -> FloatArray:
+        """Return where material points are now [m], shape (n, 3); see `TissueLink`."""
+        n, request = len(holders), MATERIAL_POINTS.pack(PointsAtRest(at_rest, holders))
+        unpack, limit = functools.partial(_checked_positions, n), positions_bytes(n)
+        found = self._connection.request(MessageKind.POSITIONS, request, limit, unpack)
+        holders[:] = found.holders
+        return found.positions
+
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
         return self._connection.request(MessageKind.QUALITY, b"", MAP_BYTES, CUT_REPORT.unpack)
@@ -253,6 +267,18 @@ def _checked_result(before: Sequence[FrameLoad] | None, n_geoms: int, payload: b
     if before is not None and n != len(before):
         raise MessageError(f"a step reply with the loads on {n} frames; there are {len(before)}")
     return reply
+
+
+def _checked_positions(n_points: int, payload: bytes) -> PointsNow:
+    """Return the content of the reply with positions.
+
+    Raises:
+        MessageError: it is none, or of another number of points.
+    """
+    found = POINTS_NOW.unpack(payload)
+    if len(found.positions) != n_points:
+        raise MessageError(f"the positions of {len(found.positions)} points; wanted {n_points}")
+    return found
 
 
 def _nothing(payload: bytes) -> None:

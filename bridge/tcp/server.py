@@ -12,19 +12,23 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from bridge.link import InProcessLink, SceneView
+from bridge.description import SceneView
+from bridge.link import InProcessLink
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
 from bridge.tcp.messages.body import (
     CHUNKS,
     CUT_FACES,
     CUT_REPORT,
     DEFORMATION,
+    MATERIAL_POINTS,
     PIECES,
+    POINTS_NOW,
     QUANTITY,
     SINCE,
     SNAPSHOT,
     SURFACE,
     VALUES,
+    PointsNow,
 )
 from bridge.tcp.messages.driven import (
     ATTACHMENT,
@@ -132,6 +136,7 @@ class TissueServer(SingleClientServer):
             MessageKind.COLLIDE: self._collide,
             MessageKind.RELEASE: self._release,
             MessageKind.CUT_FACES: self._cut_faces,
+            MessageKind.POSITIONS: self._positions_of,
             MessageKind.VALUES: lambda payload: VALUES.pack(
                 self._link.surface_values(QUANTITY.unpack(payload))
             ),
@@ -218,6 +223,19 @@ class TissueServer(SingleClientServer):
         since = SINCE.unpack(payload)
         with _refusals():
             return CUT_FACES.pack(self._link.cut_faces(since))
+
+    def _positions_of(self, payload: bytes) -> bytes:
+        """Return where material points are.
+
+        Raises:
+            MessageError: the body has no such tetrahedra.
+        """
+        at_rest, holders = MATERIAL_POINTS.unpack(payload)
+        n = self._link.tissue.n_tetrahedra
+        if not ((holders >= -1) & (holders < n)).all():
+            raise MessageError(f"a material point is in none of the {n} tetrahedra")
+        holders = holders.copy()
+        return POINTS_NOW.pack(PointsNow(self._link.positions_of(at_rest, holders), holders))
 
     def _collide(self, payload: bytes) -> bytes:
         """Replace the geoms that the tissue touches, and return an empty reply.

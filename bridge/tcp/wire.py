@@ -22,7 +22,7 @@ PROTOCOL_VERSION = 12
 contacts and energies of a step; 6 added driven frames; 7 added driven geoms
 and ties; 8 added values at the surface; 9 made contents
 MessagePack; 10 added stress and strain of tetrahedra;
-11 added labels of surfaces; 12 added the list of cut faces."""
+11 added labels of surfaces; 12 added the list of cut faces and positions of material points."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be kept before it can be checked. A step request
@@ -65,6 +65,7 @@ class MessageKind(enum.IntEnum):
     END = 18
     DEFORMATION = 19
     CUT_FACES = 20
+    POSITIONS = 21
 
 
 class Frame(NamedTuple):

@@ -14,14 +14,14 @@ import numpy as np
 from bridge import TissueFrame, TissueLink
 from scalpel_sim.arm.hand import Hand
 from scalpel_sim.instruments.line_pursuit import LastLook, LinePursuit
-from scalpel_sim.instruments.stroke_follower import StrokeFollower
+from scalpel_sim.instruments.stroke_follower import NO_SHIFT, StrokeFollower
 from scalpel_sim.strokes.asked import n_large
 from scalpel_sim.strokes.guard import LONGEST_PURSUIT, Guard
 from scalpel_sim.strokes.sequence import through_air
 from scalpel_sim.strokes.skin_course import SkinCourse
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import SPEED_UP_TIME
-from tissue import BladeSegment, StepResult, pieces_of
+from tissue import StepResult, pieces_of
 
 LONGEST_WAY = 10.0
 """Longest time on the way through the air from a stroke to the next [s]: a metre."""
@@ -82,7 +82,7 @@ class StrokeProgress:
         """Area that was cut when pieces were counted last [m2]."""
         self.box: tuple[float, ...] = ()
         """Lowest and highest corner of the body when the blade was led over [m]."""
-        self.shift = (0.0, 0.0, 0.0)
+        self.shift = NO_SHIFT
         """Where the tip is led to, from where the plan has it [m]."""
         courses = [guard.course for guard in stroke.guards]
         self.looks = [LastLook(0 if each is None else len(each.times)) for each in courses]
@@ -154,19 +154,10 @@ class GuardedFollower:
             progress.enter(GOING)
         if progress.mode != ENDED and not self._is_following:
             self._pursuit.leave(step)
-        path, at, follower = self._stroke, progress.at, self._follower
         if progress.mode == OVER:
-            at = progress.seconds
-            path, follower = self._way_over()
-        if any(progress.shift):
-            self._lead_beside(path.pose(at))
+            self._way_over()[1].lead(progress.seconds, progress.shift)
         else:
-            follower.lead(at)
-
-    def _lead_beside(self, pose: BladeSegment) -> None:
-        """Lead the blade to a pose, moved by the shift."""
-        tip, heel = pose.tip + self.progress.shift, pose.heel + self.progress.shift
-        self._hand.follow(self._frame.segment_to_world(BladeSegment(tip, heel, pose.forward)))
+            self._follower.lead(progress.at, progress.shift)
 
     @property
     def _is_following(self) -> bool:

@@ -12,13 +12,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from bridge import TissueLink
+from scalpel_sim.quaternions import Vector
+from scalpel_sim.strokes.path import pose_on_path
 from scalpel_sim.strokes.skin_course import SkinCourse
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, IntArray
+from tissue.support import SameTypes, Vec3, add, axpy, dot, kernel, lerp, norm, scale, sub, vec3
 
 LOOK_EVERY = 0.01
-"""Time between two looks at the line [s]: that of a fast camera. Each takes the body's state, and
-ten times as many gave no better cut."""
+"""Time between two looks at the line [s]: that of a fast camera. Ten times as many gave no better
+cut."""
 
 _BACK_ASIDE = 1.5e-3
 """Way along the line over which the tip makes up for a distance aside [m]: as that over which its
@@ -93,7 +96,8 @@ class LinePursuit:
     """
 
     def __init__(self, stroke: Stroke, link: TissueLink, progress: PursuitState) -> None:
-        self._stroke, self._link, self._progress = stroke, link, progress
+        self._path, self._link, self._progress = stroke.path, link, progress
+        self._pursue = SameTypes(pursue)
 
     def go(self, part: int, course: SkinCourse, end: float, step: float) -> None:
         """Go on along the line.
@@ -107,33 +111,13 @@ class LinePursuit:
         progress = self._progress
         look = progress.looks[part]
         if progress.now >= look.next:
-            look.moved[:] = course.displacements(self._link.snapshot(), look.holders)
+            look.moved[:] = course.displacements(self._link, look.holders)
             look.next = progress.now + LOOK_EVERY
-        if step <= 0.0:
-            return
-        at, later = progress.at, min(progress.at + _FASTEST_CLOCK * step, end)
-        line = _CarriedLine(self._stroke, course, look.moved)
-        place, plan = line.place(at), self._stroke.pose(at)
-        tip = plan.tip + progress.shift
-        planned = float(np.linalg.norm(self._stroke.pose(at + step).tip - plan.tip))
-        error = place - tip
-        if line.rests(at):
-            share = course.speed * step / max(_BACK_ASIDE, float(np.linalg.norm(error)))
-            tip = tip + min(share, 1.0) * error
-            progress.at = min(at + step, end)
-        else:
-            ahead = line.ahead(at)
-            edge = (plan.heel - plan.tip) / np.linalg.norm(plan.heel - plan.tip)
-            error = error - (error @ ahead) * ahead
-            in_depth = (error @ edge) * edge
-            way = ahead + (error - in_depth) / _BACK_ASIDE + in_depth / _BACK_IN_DEPTH
-            length = max(planned, _SLOWEST * course.speed * step)
-            tip = tip + length / np.linalg.norm(way) * way
-            progress.at = _passed(ahead, tip, (at, place), (later, line.place(later)))
-        if end - progress.at < _AT_END:
-            progress.at = end
-        shift = tip - self._stroke.pose(progress.at).tip
-        progress.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
+        if step > 0.0:
+            clock, line = (progress.at, step, end), (self._path, course.times, look.moved)
+            progress.at, progress.shift = self._pursue.call(
+                *clock, progress.shift, course.speed, *line
+            )
 
     def leave(self, step: float) -> None:
         """Bring the tip back to the plan.
@@ -148,65 +132,108 @@ class LinePursuit:
             self._progress.shift = (share * x, share * y, share * z)
 
 
+@kernel
+def pursue(
+    at: float, step: float, end: float, shift: Vector, speed: float,
+    path: FloatArray, times: FloatArray, moved: FloatArray,
+) -> tuple[float, Vector]:  # fmt: skip
+    """Go on along a line as it lies; return the clock [s] and the shift [m] then.
+
+    Args:
+        at: The clock [s].
+        step: Time for which the tip goes [s].
+        end: When the stroke ends, on the clock [s].
+        shift: Where the tip is led to, from where the plan has it [m].
+        speed: Speed of the stroke [m/s].
+        path: `Stroke.path`.
+        times: When the tip is to be below each place of the line [s], shape (n,).
+        moved: Displacement of each of these places since the stroke was planned [m], shape (n, 3).
+    """
+    line = _CarriedLine(path, times, moved)
+    plan, (x, y, z) = _tip(line, at), shift
+    tip, place = add(plan, Vec3(x, y, z)), _place(line, at)
+    before, after = sub(plan, _tip(line, at - _AT_END)), sub(_tip(line, at + _AT_END), plan)
+    error = sub(place, tip)
+    if max(norm(before), norm(after)) < _STILL:  # it rests, and the blade turns
+        share = speed * step / max(_BACK_ASIDE, norm(error))
+        tip = axpy(min(share, 1.0), error, tip)
+        at = min(at + step, end)
+    else:
+        near = before if norm(after) < _STILL else after  # at the end of a leg
+        ahead = _ahead(line, at, speed, scale(1.0 / norm(near), near))
+        edge = _edge(line, at)
+        error = axpy(-dot(error, ahead), ahead, error)
+        in_depth = scale(dot(error, edge), edge)
+        way = axpy(1.0 / _BACK_ASIDE, sub(error, in_depth), ahead)
+        way = axpy(1.0 / _BACK_IN_DEPTH, in_depth, way)
+        length = max(norm(sub(_tip(line, at + step), plan)), _SLOWEST * speed * step)
+        tip = axpy(length / norm(way), way, tip)
+        later = min(at + _FASTEST_CLOCK * step, end)
+        behind, before_it = dot(sub(place, tip), ahead), dot(sub(_place(line, later), tip), ahead)
+        at = _passed(at, behind, later, before_it)
+    if end - at < _AT_END:
+        at = end
+    moved_by = sub(tip, _tip(line, at))
+    return at, (moved_by.x, moved_by.y, moved_by.z)
+
+
 class _CarriedLine(NamedTuple):
-    """The way of the tip as the line on the skin carries it."""
+    """The way of the tip as the line on the skin carries it: see `pursue`."""
 
-    stroke: Stroke
-    course: SkinCourse
+    path: FloatArray
+    times: FloatArray
     moved: FloatArray
-    """Displacement of each place of the course [m], shape (n, 3)."""
-
-    def place(self, at: float) -> FloatArray:
-        """Return where the tip is to be at an instant of the clock [m], shape (3,)."""
-        times, moved = self.course.times, self.moved
-        after = int(np.searchsorted(times, at))
-        if after == 0 or after == len(times):
-            return np.asarray(self.stroke.pose(at).tip + moved[min(after, len(times) - 1)])
-        share = (at - times[after - 1]) / (times[after] - times[after - 1])
-        carried = moved[after - 1] + share * (moved[after] - moved[after - 1])
-        return np.asarray(self.stroke.pose(at).tip + carried)
-
-    def rests(self, at: float) -> bool:
-        """Return whether the tip rests, and the blade turns."""
-        ways = self._near(at)
-        return bool(max(map(np.linalg.norm, ways)) < _STILL)
-
-    def _near(self, at: float) -> tuple[FloatArray, FloatArray]:
-        """Return the way of the tip in its plan just before an instant, and just after [m]."""
-        before, tip, after = (self.stroke.pose(at + t).tip for t in (-_AT_END, 0.0, _AT_END))
-        return tip - before, after - tip
-
-    def ahead(self, at: float) -> FloatArray:
-        """Return the direction of the line there, as it lies; shape (3,)."""
-        tip = self.stroke.pose(at).tip
-        before, after = self._near(at)
-        near = before if np.linalg.norm(after) < _STILL else after  # at the end of a leg
-        planned = near / np.linalg.norm(near)
-        later = at + _PEEK / self.course.speed
-        chord = self.stroke.pose(later).tip - tip
-        way = self.place(later) - self.place(at)
-        if chord @ planned < _STRAIGHT * np.linalg.norm(chord) or way @ planned <= 0.0:
-            return np.asarray(planned)
-        return np.asarray(way / np.linalg.norm(way))
 
 
-def _passed(
-    ahead: FloatArray,
-    tip: FloatArray,
-    earlier: tuple[float, FloatArray],
-    later: tuple[float, FloatArray],
-) -> float:
+@kernel
+def _tip(line: _CarriedLine, at: float) -> Vec3:
+    """Return where the tip is in its plan at an instant of the clock [m]."""
+    x, y, z = pose_on_path(at, line.path)[0]
+    return Vec3(x, y, z)
+
+
+@kernel
+def _edge(line: _CarriedLine, at: float) -> Vec3:
+    """Return the unit vector from tip to heel in the plan."""
+    x, y, z = pose_on_path(at, line.path)[1]
+    edge = sub(Vec3(x, y, z), _tip(line, at))
+    return scale(1.0 / norm(edge), edge)
+
+
+@kernel
+def _place(line: _CarriedLine, at: float) -> Vec3:
+    """Return where the tip is to be at an instant of the clock [m]."""
+    times, moved = line.times, line.moved
+    after = int(np.searchsorted(times, at))
+    if after == 0 or after == len(times):
+        return add(_tip(line, at), vec3(moved, min(after, len(times) - 1)))
+    share = (at - times[after - 1]) / (times[after] - times[after - 1])
+    return add(_tip(line, at), lerp(share, vec3(moved, after - 1), vec3(moved, after)))
+
+
+@kernel
+def _ahead(line: _CarriedLine, at: float, speed: float, planned: Vec3) -> Vec3:
+    """Return the direction of the line as it lies; that of its plan at a corner."""
+    later = at + _PEEK / speed
+    chord = sub(_tip(line, later), _tip(line, at))
+    way = sub(_place(line, later), _place(line, at))
+    if dot(chord, planned) < _STRAIGHT * norm(chord) or dot(way, planned) <= 0.0:
+        return planned
+    return scale(1.0 / norm(way), way)
+
+
+@kernel
+def _passed(earlier: float, behind: float, later: float, before: float) -> float:
     """Return the instant at which the line is level with the tip [s], between two others.
 
     Args:
-        ahead: Direction of the line.
-        tip: Where the tip is [m].
-        earlier: The first of the two, and the place of the line then [m].
-        later: The other one.
+        earlier: The first of the two [s].
+        behind: Distance of the line from the tip then, ahead [m].
+        later: The other one [s].
+        before: Distance of the line from the tip then [m].
     """
-    behind, before = (float((place - tip) @ ahead) for _, place in (earlier, later))
     if behind >= 0.0:
-        return earlier[0]
+        return earlier
     if before <= 0.0:
-        return later[0]
-    return earlier[0] + (later[0] - earlier[0]) * behind / (behind - before)
+        return later
+    return earlier + (later - earlier) * behind / (behind - before)

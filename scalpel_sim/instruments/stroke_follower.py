@@ -10,9 +10,12 @@ from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray
 from tissue.support import SameTypes, kernel
 
+NO_SHIFT: Vector = (0.0, 0.0, 0.0)
+"""The blade is led where the path has it."""
+
 
 class StrokeFollower:
-    """Does what `hand.follow(frame.segment_to_world(stroke.pose(t)))` does.
+    """Does what `hand.follow(frame.segment_to_world(stroke.pose(t)))` does, or beside that pose.
 
     Args:
         hand: Holds a blade already.
@@ -23,21 +26,25 @@ class StrokeFollower:
     def __init__(self, hand: Hand, stroke: Stroke, frame: TissueFrame) -> None:
         self._path = stroke.path
         self._placement = np.vstack((frame.rotation, frame.origin))
-        self._is_turned = frame.is_rotated
         self._command = hand.command
         self._lead = SameTypes(_lead)
 
-    def lead(self, t: float) -> None:
-        """Lead the blade to its pose at time `t` [s], a step after the last one."""
-        self._lead.call(t, self._path, self._placement, self._is_turned, *self._command)
+    def lead(self, t: float, shift: Vector = NO_SHIFT) -> None:
+        """Lead the blade to its pose at time `t` [s], a step after the last one.
+
+        Args:
+            t: The time.
+            shift: Way from there on which it is led [m], tissue frame.
+        """
+        self._lead.call(t, shift, self._path, self._placement, *self._command)
 
 
 @kernel
 def _lead(
     t: float,
+    shift: Vector,
     path: FloatArray,
     placement: FloatArray,
-    is_turned: bool,
     position: FloatArray,
     quaternion: FloatArray,
     control: FloatArray,
@@ -47,22 +54,27 @@ def _lead(
 
     Args:
         t: Time [s].
+        shift: Way beside the path [m], tissue frame.
         path: `Stroke.path`.
         placement: Axes of the tissue in the world as columns and, in a last row, its origin [m].
-        is_turned: Whether these axes are others than those of the world.
         position: See `HandCommand`, as the rest.
         quaternion: Rotation of the hand.
         control: Offsets of the actuators.
         leads: Their factors.
     """
     tip, heel, forward = pose_on_path(t, path)
-    if is_turned:
-        tip, heel = _turned(tip, placement), _turned(heel, placement)
-        forward = _turned(forward, placement)
-    x, y, z = placement[3, 0], placement[3, 1], placement[3, 2]
-    tip = (tip[0] + x, tip[1] + y, tip[2] + z)
-    heel = (heel[0] + x, heel[1] + y, heel[2] + z)
+    tip, heel = _moved(tip, shift), _moved(heel, shift)
+    tip, heel = _turned(tip, placement), _turned(heel, placement)
+    forward = _turned(forward, placement)
+    origin = placement[3, 0], placement[3, 1], placement[3, 2]
+    tip, heel = _moved(tip, origin), _moved(heel, origin)
     lead_to(tip, heel, forward, position, quaternion, control, leads)
+
+
+@kernel
+def _moved(point: Vector, way: Vector) -> Vector:
+    """Return a point, moved by a way [m]."""
+    return point[0] + way[0], point[1] + way[1], point[2] + way[2]
 
 
 @kernel

@@ -22,7 +22,8 @@ import numpy as np
 from bridge import TissueFrame, compiled_arithmetic
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
-from scalpel_sim.instruments.stroke_follower import StrokeFollower
+from scalpel_sim.instruments.line_pursuit import pursue
+from scalpel_sim.instruments.stroke_follower import NO_SHIFT, StrokeFollower
 from scalpel_sim.recording.columns import COLUMNS, FrameData, WallTimes, force_parts, frame_row
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.recording.row_writer import RowWriter
@@ -268,6 +269,7 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     force_parts(result.contacts, before.forward)
     tissue.step(None, dt)
     tissue.chunks()
+    tissue.positions_of(tissue.material_points([0]))
     surface = tissue.surface()
     charts_of(surface.rest_positions, surface.triangles, _SIDE).mesh(surface.positions)
     tissue.surface_values("strain")
@@ -314,7 +316,7 @@ def _move(kernels: KernelSet) -> None:
     pose = arm.blade.segment()
     stroke = Stroke((0.0, 1.0), (pose, pose))
     StrokeFollower(arm.hand, stroke, TissueFrame()).lead(0.0)
-    stroke.pose(0.0)
+    pursue(0.0, _DT, 1.0, NO_SHIFT, _SIDE, stroke.path, stroke.times, np.zeros((2, 3)))
     CollisionMonitor(arm).check()
 
 

@@ -1,11 +1,12 @@
-"""The replies about the whole body: snapshot, surface, pieces, chunks, accuracy of the cuts."""
+"""The replies about the body: snapshot, surface, pieces, chunks, accuracy of the cuts."""
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
 
+from bridge.tcp.messages.driven import expect_near
 from bridge.tcp.messages.encoding import (
     MAP_BYTES,
     Array,
@@ -39,8 +40,29 @@ _TRIANGLE_BYTES = 3 * 8 + 1 + 8
 
 _FACE_BYTES = 9 * 8 + 8 + 2 * 8 + 8 + 8
 
+_POINT_BYTES = 3 * 8 + 8
+
 _N_CAUSES = 3
 """Number of causes of a cut face: see `tissue.CutFaces`."""
+
+
+class PointsAtRest(NamedTuple):
+    """Material points whose positions are asked for."""
+
+    at_rest: FloatArray
+    """Where they are in the body at rest [m], shape (n, 3)."""
+    holders: IntArray
+    """Tetrahedron that held each when it was looked up last, or -1; shape (n,)."""
+
+
+class PointsNow(NamedTuple):
+    """The positions of material points."""
+
+    positions: FloatArray
+    """Where they are now [m], shape (n, 3)."""
+    holders: IntArray
+    """Tetrahedron that holds each, shape (n,)."""
+
 
 _Natural = Annotated[float, msgspec.Meta(ge=0.0)]
 """A float that is not negative; infinity is the time step of a body that cannot move."""
@@ -64,6 +86,11 @@ def surface_bytes(n_tetrahedra: int) -> int:
 def cut_faces_bytes(n_faces: int) -> int:
     """Return the length of a list of cut faces [byte], at most."""
     return MAP_BYTES + n_faces * _FACE_BYTES
+
+
+def positions_bytes(n_points: int) -> int:
+    """Return the length of the positions of material points [byte], at most."""
+    return MAP_BYTES + n_points * _POINT_BYTES
 
 
 def values_bytes(n_nodes: int) -> int:
@@ -96,6 +123,15 @@ def _check_cut_faces(faces: CutFaces) -> None:
         raise MessageError("a cut face has an area below 0")
     if not ((faces.causes >= 0) & (faces.causes < _N_CAUSES)).all():
         raise MessageError(f"a cut face has no cause from 0 to {_N_CAUSES - 1}")
+
+
+def _check_points(points: PointsAtRest) -> None:
+    expect_near(points.at_rest, "a material point")
+
+
+def _check_positions(points: PointsNow) -> None:
+    if (points.holders < 0).any():
+        raise MessageError("a material point without a tetrahedron")
 
 
 def _check_cut_report(report: CutReport) -> None:
@@ -187,6 +223,20 @@ CUT_FACES: Message[CutFaces] = Message(
     _check_cut_faces,
 )
 """The reply with faces that cuts have opened, in order."""
+
+MATERIAL_POINTS: Message[PointsAtRest] = Message(
+    Record(PointsAtRest, at_rest=("points", 3), holders=("points",)),
+    "the material points",
+    _check_points,
+)
+"""The request for the positions of material points."""
+
+POINTS_NOW: Message[PointsNow] = Message(
+    Record(PointsNow, positions=("points", 3), holders=("points",)),
+    "the positions of material points",
+    _check_positions,
+)
+"""The reply to it."""
 
 CUT_REPORT: Message[CutReport] = Message(
     Record(

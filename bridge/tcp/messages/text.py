@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from bridge.link import NamedLabel, SceneView, TissueDescription
+from bridge.description import NamedLabel, SceneView, TissueDescription
 from bridge.tcp.messages.encoding import Count, FiniteFloat, Many, Message, Part, Record
 from bridge.tcp.wire import MessageError
 from tissue import Material

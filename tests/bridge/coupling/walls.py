@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from bridge.description import TissueDescription
 from bridge.driven import GeomLoads, no_geom_loads
-from bridge.link import TissueDescription
 from tissue import (
     AddedMass,
     BladeSegment,

@@ -86,6 +86,19 @@ def test_cut_faces_are_sent_from_the_first_that_is_asked_for(link, upright):
     assert link.describe().n_cut_faces == n
 
 
+def test_material_points_are_where_they_are_in_process_bit_for_bit(link, upright):
+    here = InProcessLink(make_block())
+    cut(here, upright)
+    cut(link, upright)
+    at_rest = here.snapshot().rest_positions[:30] * 0.99 + 1e-4
+    for holders in (np.full(30, -1), np.full(30, 3)):
+        there = holders.copy()
+        assert bits(link.positions_of(at_rest, there)) == bits(here.positions_of(at_rest, holders))
+        assert there.tolist() == holders.tolist()
+    with pytest.raises(LinkError, match="a material point is in none of the"):
+        link.positions_of(at_rest, np.full(30, 10**6))
+
+
 def test_the_description_is_that_of_the_tissue_that_is_served(link):
     here = InProcessLink(make_block(), "block").describe()
     there = link.describe()

@@ -12,7 +12,16 @@ from bridge.device.messages import STATE as DEVICE_STATE
 from bridge.driven import GeomLoads
 from bridge.tcp.address import IDLE_SECONDS, N_PROBES, PROBE_SECONDS, parse_address
 from bridge.tcp.channel import Authenticator, direction_keys
-from bridge.tcp.messages.body import CHUNKS, CUT_FACES, CUT_REPORT, DEFORMATION, SNAPSHOT, SURFACE
+from bridge.tcp.messages.body import (
+    CHUNKS,
+    CUT_FACES,
+    CUT_REPORT,
+    DEFORMATION,
+    MATERIAL_POINTS,
+    POINTS_NOW,
+    SNAPSHOT,
+    SURFACE,
+)
 from bridge.tcp.messages.driven import ATTACHMENT, GEOMS, MAX_GEOMS, TIE
 from bridge.tcp.messages.encoding import Array
 from bridge.tcp.messages.step import RESULT, STEP
@@ -136,7 +145,19 @@ RESULT_PART = RESULT._part._parts["result"]
     [
         ("HELLO", [DESCRIPTION]),
         ("STEP", [STEP, RESULT, RESULT_PART]),
-        ("The body", [SNAPSHOT, SURFACE, DEFORMATION, CUT_FACES, CHUNKS, CUT_REPORT]),
+        (
+            "The body",
+            [
+                SNAPSHOT,
+                SURFACE,
+                DEFORMATION,
+                CUT_FACES,
+                MATERIAL_POINTS,
+                POINTS_NOW,
+                CHUNKS,
+                CUT_REPORT,
+            ],
+        ),
         ("Driven frames", [ATTACHMENT, TIE]),
         ("Driven geoms", [GEOMS]),
         ("A device that drives", [DEVICE_DESCRIPTION, SERVO, DEVICE_STATE]),

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from bridge.description import TissueDescription
 from bridge.device.messages import (
     DEVICE_DESCRIPTION,
     SERVO,
@@ -23,18 +24,21 @@ from bridge.driven import (
     GeomLoads,
     GeomPoses,
 )
-from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     CHUNKS,
     CUT_FACES,
     CUT_REPORT,
     DEFORMATION,
+    MATERIAL_POINTS,
     PIECES,
+    POINTS_NOW,
     QUANTITY,
     SINCE,
     SNAPSHOT,
     SURFACE,
     VALUES,
+    PointsAtRest,
+    PointsNow,
 )
 from bridge.tcp.messages.driven import (
     ATTACHMENT,
@@ -60,6 +64,10 @@ GEOM_LOADS = GeomLoads(*np.arange(12.0).reshape(2, 2, 3))
 FRAMES = [FramePose(np.zeros(3), np.eye(3))]
 N_MUTATIONS = 2000
 """Number of changed copies of each message."""
+
+
+POINTS_OF_TWO = np.array([(0.01, 0.0, 0.02), (0.02, 0.01, 0.0)]), np.array([3, 0])
+"""Two points, and tetrahedra."""
 
 
 def cut_faces():
@@ -96,6 +104,8 @@ def real_messages():
         "snapshot": (SNAPSHOT.pack(tissue.snapshot()), SNAPSHOT.unpack),
         "deformation": (DEFORMATION.pack(tissue.deformation()), DEFORMATION.unpack),
         "since": (SINCE.pack(2), SINCE.unpack),
+        "points": (MATERIAL_POINTS.pack(PointsAtRest(*POINTS_OF_TWO)), MATERIAL_POINTS.unpack),
+        "positions": (POINTS_NOW.pack(PointsNow(*POINTS_OF_TWO)), POINTS_NOW.unpack),
         "cut faces": (CUT_FACES.pack(cut_faces()), CUT_FACES.unpack),
         "chunks": (CHUNKS.pack(tissue.chunks()), CHUNKS.unpack),
         "surface": (SURFACE.pack(tissue.surface()), SURFACE.unpack),
@@ -148,6 +158,10 @@ IS_VALID = {
     ),
     "loads": lambda value: all(load.n_points >= 0 for load in value),
     "since": lambda value: value >= 0,
+    "points": lambda value: is_finite(value.at_rest) and len(value.at_rest) == len(value.holders),
+    "positions": lambda value: (
+        len(value.positions) == len(value.holders) and value.holders.min(initial=0) >= 0
+    ),
     "cut faces": lambda value: (
         is_finite(value.corners, value.areas, value.times)
         and len(value.corners) == len(value.labels) == len(value.areas)

@@ -4,8 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from bridge.description import NamedLabel, SceneView, TissueDescription
 from bridge.device.messages import DEVICE_DESCRIPTION, DeviceDescription
-from bridge.link import NamedLabel, SceneView, TissueDescription
 from bridge.tcp.messages.text import (
     DESCRIPTION,
     LARGEST_DESCRIPTION,
