@@ -31,7 +31,7 @@ from tissue.integrators.stability import damping_rate, stable_step
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
-from tissue.mesh.cut_faces import CutFaceLog
+from tissue.mesh.cut_face_log import CutFaceLog
 from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.node_means import write_node_means
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces

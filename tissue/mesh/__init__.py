@@ -6,6 +6,8 @@ In the order in which they are best read:
     faces             shared faces, the boundary, and the distance of cut faces from the path
     star              the tetrahedra around a node or an edge
     changes           what a cut step changed, and what owners of arrays do then
+    cut_faces         faces that cuts have opened
+    cut_face_log      the list of them, which grows with each pass of a cut
     node_motion       the nodes that moved since a search
     tetrahedron_grid  a grid of cells that list tetrahedra
     point_location    which tetrahedron holds a point, by that grid

@@ -79,6 +79,7 @@ def summary_of(
             first=body(),
             last=body(),
             report=CUT_REPORT,
+            cut_faces=None,
             wall_seconds=wall_seconds,
             tetrahedra_final=8,
             asked_area=2.5e-4,
