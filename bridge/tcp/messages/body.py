@@ -42,6 +42,10 @@ _FACE_BYTES = 9 * 8 + 8 + 2 * 8 + 8 + 8
 
 _POINT_BYTES = 3 * 8 + 8
 
+MAX_POINTS = 1 << 12
+"""Largest number of material points in a request: a line of a metre in steps of 0.25 mm. Each
+that is new is looked for in all tetrahedra."""
+
 _N_CAUSES = 3
 """Number of causes of a cut face: see `tissue.CutFaces`."""
 
@@ -126,6 +130,9 @@ def _check_cut_faces(faces: CutFaces) -> None:
 
 
 def _check_points(points: PointsAtRest) -> None:
+    n = len(points.at_rest)
+    if n > MAX_POINTS:
+        raise MessageError(f"{n} material points; wanted {MAX_POINTS} at most")
     expect_near(points.at_rest, "a material point")
 
 

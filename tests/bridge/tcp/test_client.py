@@ -14,6 +14,7 @@ import pytest
 from bridge import Bridge, InProcessLink, LinkError, SceneView, TcpLink
 from bridge.driven import FrameAttachment, FramePose
 from bridge.tcp.address import parse_address
+from bridge.tcp.messages.body import MAX_POINTS
 from bridge.tcp.messages.step import RESULT, pack_step
 from bridge.tcp.messages.text import pack_error, unpack_error
 from bridge.tcp.peer import HANDSHAKE_BYTES
@@ -97,6 +98,8 @@ def test_material_points_are_where_they_are_in_process_bit_for_bit(link, upright
         assert there.tolist() == holders.tolist()
     with pytest.raises(LinkError, match="a material point is in none of the"):
         link.positions_of(at_rest, np.full(30, 10**6))
+    with pytest.raises(LinkError, match=f"{MAX_POINTS + 1} material points; wanted {MAX_POINTS}"):
+        link.positions_of(np.zeros((MAX_POINTS + 1, 3)), np.full(MAX_POINTS + 1, -1))
 
 
 def test_the_description_is_that_of_the_tissue_that_is_served(link):
