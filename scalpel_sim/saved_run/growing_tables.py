@@ -117,7 +117,13 @@ class GrowingTables:
                 if self._growth is None:
                     self._begin_growth({name: end})
                 self._end_growth()
-            self._file.write(name, first, numbers.tobytes())
+            try:
+                self._file.write(name, first, numbers.tobytes())
+            except OSError:
+                if self._growth is None:
+                    raise
+                self._drop_growth()  # the larger file took the space that this one needs
+                self._file.write(name, first, numbers.tobytes())
         self._lengths[name] = end
         return first
 
@@ -134,10 +140,10 @@ class GrowingTables:
                 if self._grows_early and self._is_nearly_full:
                     self._begin_growth({})
             elif self._growth.file.done():
-                if self._growth.file.exception() is None:
+                try:
                     self._end_growth()
-                else:  # it is tried again where there is no room at all, and raises there
-                    self._grows_early, self._growth = False, None
+                except OSError:  # it is tried again where a table is full, and raises there
+                    self._grows_early = False
 
     def cut_back(self, lengths: Sequence[int]) -> None:
         """Take off what was added after `lengths` were these; at least one step stays.
@@ -212,13 +218,8 @@ class GrowingTables:
 
     def _end_writing(self) -> None:
         """Close the file. May be called twice."""
+        self._drop_growth()
         self._thread.shutdown()
-        if self._growth is not None:
-            if self._growth.file.exception() is None:
-                unused = self._growth.file.result()
-                unused.close()
-                unused.path.unlink(missing_ok=True)
-            self._growth = None
         self._file.close()
         if not self._is_in_place:
             self._file.path.unlink(missing_ok=True)
@@ -288,6 +289,14 @@ class GrowingTables:
             return file
 
         self._growth = _Growth(self._thread.submit(grown), copied)
+
+    def _drop_growth(self) -> None:
+        """Stay in this file until a table of it is full: the larger one is removed."""
+        growth, self._growth, self._grows_early = self._growth, None, False
+        if growth is not None and growth.file.exception() is None:
+            unused = growth.file.result()
+            unused.close()
+            unused.path.unlink(missing_ok=True)
 
     def _end_growth(self) -> None:
         """Continue in the larger file, once it is made."""
