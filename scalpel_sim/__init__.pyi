@@ -26,6 +26,7 @@ from .scene.arm_tables import WaypointTable as WaypointTable
 from .scene.blade import SCALPEL as SCALPEL
 from .scene.read import SCENES as SCENES
 from .scene.read import read_scene as read_scene
+from .scene.read import scene_called as scene_called
 from .scene.scene import Scene as Scene
 from .scene.scene import changed as changed
 from .simulation import Simulation as Simulation
@@ -72,6 +73,7 @@ __all__ = [
     "pixels_to_points",
     "prepare",
     "read_scene",
+    "scene_called",
     "stroke_kind",
     "take_flex",
 ]

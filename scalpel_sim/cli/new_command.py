@@ -30,7 +30,7 @@ def new(
 
     Args:
         file: The file; .toml is added to its name where it is missing.
-        scene: The scene that is written: one that comes with the project.
+        scene: The scene or task that is written: one that comes with the project.
         force: Replace the file if it exists.
     """
     from scalpel_sim.scene.read import shipped_path, shipped_scene

@@ -25,7 +25,8 @@ SceneName = Annotated[
     Parameter(
         help="organ (default), incision, retract, excise, taut_incision, layers, tumour, "
         "gallbladder, a specimen of a material (liver, kidney, skin, fat, muscle, gelatin, "
-        "silicone), slab, grid2 or grid7; or a FILE.toml, which the command `new` writes."
+        "silicone), slab, grid2 or grid7; a task (incise-v0); or a FILE.toml, which the command "
+        "`new` writes."
     ),
 ]
 

@@ -60,7 +60,7 @@ def chosen_scene(
     """Return the scene, or one around the user's mesh, with the changes that the user requests.
 
     Args:
-        name: A scene that comes with the project, or a FILE.toml; None for the default one.
+        name: A scene or task that comes with the project, or a FILE.toml; None for the default one.
         tissue: Options of body, material, blade and solver.
         arm: Options of the arm and the strokes.
         relaxation: How the motion is advanced where no layer gives it, and the tissue does not

@@ -40,7 +40,7 @@ def warm_up(
     ```
 
     Args:
-        scenes: organ, incision, slab, grid2, grid7, or all [default: organ].
+        scenes: organ, incision, incise-v0 or another scene or task, or all [default: organ].
         target: Level of processors for which to compile, and to write a bundle: x86-64-v3 (with
             AVX2), x86-64-v4 (with AVX-512) or neoverse (Arm, N1 and later). This machine has to be
             of that level [default: for this processor alone, without a bundle].
@@ -50,12 +50,12 @@ def warm_up(
         raise UsageError("--out names a bundle: give --target, too")
     with log_to_stderr(printing):
         from scalpel_sim.runs.warm_up import compile_ahead, kernels_are_compiled
-        from scalpel_sim.scene.read import SCENES
+        from scalpel_sim.scene.read import SHIPPED_SCENES, TASK_SCENES
 
         if target is not None:
             _expect_level(target)
-        every = "all" in scenes
-        chosen: Sequence[str | None] = list(SCENES) if every else scenes or (None,)
+        known, every = (*SHIPPED_SCENES, *TASK_SCENES), "all" in scenes
+        chosen: Sequence[str | None] = known if every else scenes or (None,)
         sets = _sets(chosen, tissue)
         with compiling(printing) as on_progress:
             compile_ahead(sets, on_progress, target)

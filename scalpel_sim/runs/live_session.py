@@ -26,7 +26,7 @@ from scalpel_sim.runs.prepared_run import PreparedRun
 from scalpel_sim.runs.run import perform
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.checks import LONGEST_RUN
-from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.read import SHIPPED_SCENES, TASK_SCENES
 from scalpel_sim.viewer.looks import look_of_scene
 from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.pictures import show_run
@@ -137,7 +137,7 @@ class LiveSession:
             self._first = self._first or scene.name
             choices = Choices(
                 self._first,
-                ["", *(name for name in SCENES if name != self._first)],
+                ["", *(name for name in SHIPPED_SCENES if name != self._first)],
                 asked.scene,
                 list(MATERIALS),
                 asked.material or "",
@@ -145,6 +145,7 @@ class LiveSession:
                 0.0 if scene.blade is None else scene.blade.thickness,
                 asked.is_led,
                 asked.lines,
+                [name for name in TASK_SCENES if name != self._first],
             )
         is_led, look = asked.is_led and not is_led_by_device, look_of_scene(scene)
         controls = PageControls(self._commands, is_led, choices, look)

@@ -25,7 +25,7 @@ from scalpel_sim.tables.problems import (
 )
 from scalpel_sim.tables.text_files import read_toml
 
-_SHIPPED = Path(__file__).parent / "shipped"
+_HERE = Path(__file__).parent
 
 SHIPPED_SCENES = (
     "organ",
@@ -48,6 +48,10 @@ SHIPPED_SCENES = (
     "grid7",
 )
 """Names of the scenes that come with the project."""
+
+TASK_SCENES = ("incise-v0",)
+"""Names of the tasks that come with it. One never changes what it means: changed, it has another
+version."""
 
 DEFAULT_SCENE = "organ"
 
@@ -105,19 +109,20 @@ def read_scene_file(path: Path) -> SceneFile:
 
 
 def shipped_scene(name: str) -> SceneFile:
-    """Return the content of the scene of that name.
+    """Return the content of the scene or the task of that name.
 
     Raises:
         UsageError: there is none; the message lists them.
     """
-    if name not in SHIPPED_SCENES:
-        raise unknown("scene", name, SHIPPED_SCENES)
+    known = (*SHIPPED_SCENES, *TASK_SCENES)
+    if name not in known:
+        raise unknown("scene", name, known)
     return read_scene_file(shipped_path(name))._replace(folder=Path(), origin="")
 
 
 def shipped_path(name: str) -> Path:
-    """Return the file of a scene that comes with the project."""
-    return _SHIPPED / f"{name}.toml"
+    """Return the file of a scene or a task that comes with the project."""
+    return _HERE / ("tasks" if name in TASK_SCENES else "shipped") / f"{name}.toml"
 
 
 def with_environment(file: SceneFile, environment: Mapping[str, str]) -> SceneFile:
@@ -305,11 +310,9 @@ that one stroke cuts through. `--material liver` is liver as published."""
 
 
 def scene_called(name: str) -> Scene:
-    """Return the scene of that name.
+    """Return the scene or the task of that name.
 
     Raises:
         UsageError: there is none; the message lists them.
     """
-    if name not in SCENES:
-        raise unknown("scene", name, SCENES)
-    return SCENES[name]
+    return SCENES[name] if name in SCENES else scene_in(shipped_scene(name))

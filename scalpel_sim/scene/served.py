@@ -8,7 +8,7 @@ from bridge import LinkError, SceneView, TissueLink, sent_scene_name
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.body import GivenBody
 from scalpel_sim.scene.checks import check_rows, check_view
-from scalpel_sim.scene.read import SCENES
+from scalpel_sim.scene.read import SCENES, TASK_SCENES, scene_called
 from scalpel_sim.scene.scene import Scene, changed
 from scalpel_sim.scene.schema import ViewTable
 from tissue import TetrahedralMesh
@@ -32,9 +32,8 @@ def scene_of(link: TissueLink, scene: Scene | None = None) -> Scene:
             raise UsageError(f"the body there is that of '{body.scene}', not of '{scene.name}'")
         return changed(scene, material=body.material)
     views = received_views(body.views)
-    known = SCENES.get(body.scene)
-    if known is not None:
-        return changed(known, material=body.material, views=views)
+    if body.scene in (*SCENES, *TASK_SCENES):
+        return changed(scene_called(body.scene), material=body.material, views=views)
     rest = link.snapshot()
     labels = rest.labels if rest.labels.any() else None
     mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra, labels, link.label_names)

@@ -46,6 +46,8 @@ class Choices(NamedTuple):
     """Whether the page leads the blade."""
     lines: Sequence[DrawnLine] = ()
     """Lines along which the script cuts, as the page has drawn them."""
+    tasks: Sequence[str] = ()
+    """Tasks, which are scenes too."""
 
 
 class PageControls(NamedTuple):

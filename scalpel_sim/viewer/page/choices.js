@@ -13,7 +13,11 @@ class NextRun {
         this.choices = choices;
         this.hasToughness = this.hasThickness = false; // whether the person has chosen one
         const nameOf = (scene) => scene || choices.first;
-        element("scene").replaceChildren(...choices.scenes.map((name) => new Option(nameOf(name), name)));
+        const optionsOf = (names) => names.map((name) => new Option(nameOf(name), name));
+        const tasks = document.createElement("optgroup");
+        tasks.label = "Tasks";
+        tasks.append(...optionsOf(choices.tasks));
+        element("scene").replaceChildren(...optionsOf(choices.scenes), ...(choices.tasks.length ? [tasks] : []));
         element("material").replaceChildren(...["", ...choices.materials].map(
             (name) => new Option(name || "as in the scene", name)));
         element("scene").value = choices.scene;

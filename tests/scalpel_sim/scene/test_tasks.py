@@ -1,0 +1,60 @@
+"""Tasks that come with the project: each is a scene, and what its script does solves it."""
+
+import re
+
+import pytest
+
+from scalpel_sim import prepare, scene_called
+from scalpel_sim.cli.app import app, command_line
+from scalpel_sim.instruments.guarded_follower import ENDED
+from scalpel_sim.scene.read import (
+    SHIPPED_SCENES,
+    TASK_SCENES,
+    read_scene_file,
+    scene_in,
+    shipped_path,
+)
+from scalpel_sim.scene.write import scene_text
+
+REST = 0.1
+"""Time after the strokes, in which what was cut comes to rest [s]."""
+
+
+def test_every_file_of_tasks_is_a_scene_by_its_name_and_version():
+    files = {path.stem for path in shipped_path("incise-v0").parent.glob("*.toml")}
+    assert files == set(TASK_SCENES)
+    assert not files & set(SHIPPED_SCENES)
+    assert all(re.fullmatch(r"[a-z_]+-v\d+", name) for name in TASK_SCENES)
+
+
+def test_the_help_names_every_task(capsys):
+    app(["run", "--help"], exit_on_error=False, result_action="return_value")
+    help_of_run = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
+    assert all(name in help_of_run for name in TASK_SCENES)
+
+
+@pytest.mark.parametrize("name", TASK_SCENES)
+def test_what_the_script_of_a_task_does_solves_it(name):
+    simulation = prepare(scene_called(name), records=False)
+    assert simulation.score.failed(), "it is not solved as it begins"
+    simulation.run(simulation.duration, lambda now: now.blade.progress.mode == ENDED)
+    simulation.run(simulation.time + REST)
+    assert simulation.score.failed() == []
+
+
+@pytest.mark.parametrize("name", TASK_SCENES)
+def test_a_task_is_of_the_size_that_can_be_learned_on(name):
+    assert 400 <= len(scene_called(name).mesh().tetrahedra) <= 1500
+
+
+@pytest.mark.parametrize("name", TASK_SCENES)
+def test_a_task_that_is_written_reads_back_the_same(name, tmp_path):
+    scene, path = scene_called(name), tmp_path / "scene.toml"
+    path.write_text(scene_text(scene, path), encoding="utf-8")
+    assert scene_in(read_scene_file(path)).settings() == scene.settings()
+
+
+def test_a_new_scene_may_be_that_of_a_task(tmp_path):
+    path = tmp_path / "mine.toml"
+    assert command_line(["new", str(path), "--from", "incise-v0"]) == 0
+    assert path.read_text() == shipped_path("incise-v0").read_text()
