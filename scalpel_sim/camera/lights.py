@@ -6,7 +6,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from scalpel_sim.camera.viewpoints import ENDOSCOPE, Viewpoint
+from scalpel_sim.camera.viewpoints import Viewpoint
+from scalpel_sim.scene.schema import ENDOSCOPE
 from tissue import FloatArray
 
 Rgb = tuple[float, float, float]

@@ -9,15 +9,10 @@ import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.errors import unknown
-from scalpel_sim.scene.schema import DEFAULT_FOV, ViewTable
+from scalpel_sim.scene.schema import DEFAULT_FOV, OVERVIEW, SHIPPED_CAMERAS, ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.own_camera import own_eye
 from tissue import FloatArray
-
-OVERVIEW, ENDOSCOPE = "overview", "endoscope"
-"""Names of the cameras that are always there."""
-
-SHIPPED = (OVERVIEW, ENDOSCOPE)
 
 ENDOSCOPE_FOV = 60.0
 """Angle from the lower to the upper side of the picture of an endoscope [degree]: laparoscopes have
@@ -110,7 +105,7 @@ def usual_camera(views: Sequence[ViewTable]) -> str:
 
 def camera_names(views: Sequence[ViewTable], model: mujoco.MjModel) -> list[str]:
     """Return the names of all cameras: of the scene, of the model, and those always there."""
-    names = [*(view.name for view in views), *model_cameras(model), *SHIPPED]
+    names = [*(view.name for view in views), *model_cameras(model), *SHIPPED_CAMERAS]
     return list(dict.fromkeys(names))
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from scalpel_sim.camera.camera import Camera
-from scalpel_sim.camera.viewpoints import ENDOSCOPE, OVERVIEW
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.report_page import ReportPicture
+from scalpel_sim.scene.schema import ENDOSCOPE, OVERVIEW
 from scalpel_sim.scoring.plan_marks import PlanMarks
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.judged import plan_marks

@@ -14,7 +14,6 @@ from scalpel_sim.camera.identities import IdentityTable, identity_table
 from scalpel_sim.camera.lights import WALL_COLOUR, usual_lights
 from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
 from scalpel_sim.camera.viewpoints import (
-    SHIPPED,
     Viewpoint,
     shipped_viewpoint,
     usual_camera,
@@ -23,6 +22,7 @@ from scalpel_sim.camera.viewpoints import (
 from scalpel_sim.errors import unknown
 from scalpel_sim.saved_run.saved_run import SavedRun
 from scalpel_sim.saved_run.saved_step import SavedStep
+from scalpel_sim.scene.schema import SHIPPED_CAMERAS
 from scalpel_sim.viewer.model_shapes import Shape, position_and_rotation
 from tissue import FloatArray, IntArray
 
@@ -86,7 +86,9 @@ class PlayedCamera:
         """Names of all cameras that there are."""
         stage = self._run.stage
         cameras = (camera.name for camera in stage.cameras)
-        return list(dict.fromkeys([*(view.name for view in stage.views), *cameras, *SHIPPED]))
+        return list(
+            dict.fromkeys([*(view.name for view in stage.views), *cameras, *SHIPPED_CAMERAS])
+        )
 
     @property
     def far(self) -> float:
@@ -143,7 +145,7 @@ class PlayedCamera:
                 return viewpoint_of(view, self._frame)
         if any(camera.name == self.name for camera in stage.cameras):
             return None
-        if self.name not in SHIPPED:
+        if self.name not in SHIPPED_CAMERAS:
             raise unknown("camera", self.name, self.names)
         shapes = list(self._shapes.values())
         return shipped_viewpoint(

@@ -19,6 +19,9 @@ from scalpel_sim.tables.values import (
     one_of,
 )
 
+BLADE_NAME = "blade"
+"""Name of the blade among the instruments, besides those of graspers."""
+
 DEFAULT_APPROACH, DEFAULT_ACROSS = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
 """Direction of the shaft and of the jaws of a grasper at first, where a motion gives none."""
 

@@ -37,19 +37,24 @@ def check_interfaces(rows: Sequence[InterfaceTable]) -> None:
             raise UsageError(f"{where} is the second one between '{first}' and '{second}'")
 
 
-def expect_parts(mesh: TetrahedralMesh, rows: Sequence[InterfaceTable]) -> None:
-    """Refuse an interface of a part that the body does not have.
+def expect_parts(mesh: TetrahedralMesh, kind: str, parts: Sequence[Sequence[str]]) -> None:
+    """Refuse a row that is about a part that the body does not have.
+
+    Args:
+        mesh: The body.
+        kind: Name of the array of the rows.
+        parts: Names of the parts that each row is about.
 
     Raises:
         UsageError: one is; the message names the parts.
     """
     present = set() if mesh.labels is None else set(np.unique(mesh.labels).tolist())
     names = [name for label, name in mesh.label_names.items() if label in present]
-    for i, row in enumerate(rows):
-        for name in row.between:
+    for i, asked in enumerate(parts):
+        for name in asked:
             if not any(each == name or each.startswith(f"{name}/") for each in names):
                 known = ", ".join(names[:_MOST_NAMED]) or "none; [[label]] names one"
                 raise UsageError(
-                    f"[[interface]] number {i + 1}: the body has no part '{name}'. Parts with a "
+                    f"[[{kind}]] number {i + 1}: the body has no part '{name}'. Parts with a "
                     f"name: {known}"
                 )

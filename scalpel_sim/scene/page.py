@@ -13,6 +13,7 @@ import msgspec
 from scalpel_sim.scene.arm_tables import WaypointTable
 from scalpel_sim.scene.body import BodyTable, OneOfBodiesTable
 from scalpel_sim.scene.case import CaseContent
+from scalpel_sim.scene.observe_table import ObserveTable
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.task_table import TaskTable
 from scalpel_sim.strokes.kinds import STROKES
@@ -48,10 +49,11 @@ def _keys(name: str) -> str:
         tables |= {
             key: table_of(kind) or row_table_of(kind) for key, kind in kinds_of(root).items()
         }
-    tables |= {
-        f"task_{key}": table_of(kind) or row_table_of(kind)
-        for key, kind in kinds_of(TaskTable).items()
-    }
+    for name_of_table, within in (("task", TaskTable), ("observe", ObserveTable)):
+        tables |= {
+            f"{name_of_table}_{key}": table_of(kind) or row_table_of(kind)
+            for key, kind in kinds_of(within).items()
+        }
     tables["one_of_bodies"] = row_table_of(kinds_of(Scene)["body"])
     tables["case_blade"] = table_of(kinds_of(CaseContent)["blade"])
     tables["case_support"] = row_table_of(kinds_of(CaseContent)["support"])

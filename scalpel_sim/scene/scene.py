@@ -10,6 +10,7 @@ from msgspec import field, structs, to_builtins
 
 from bridge import VirtualCoupling
 from scalpel_sim.errors import UsageError
+from scalpel_sim.scene.act_table import ActTable, check_act
 from scalpel_sim.scene.arm_tables import ArmTable, GrasperTable
 from scalpel_sim.scene.blade import blade_of, table_of_blade
 from scalpel_sim.scene.body import (
@@ -37,7 +38,9 @@ from scalpel_sim.scene.checks import (
 from scalpel_sim.scene.interfaces import InterfaceTable, check_interfaces, expect_parts
 from scalpel_sim.scene.labels import full_name, labelled
 from scalpel_sim.scene.materials import given_in, material_in, material_of, naming_table
+from scalpel_sim.scene.observe_table import ObserveTable, check_observe
 from scalpel_sim.scene.schema import (
+    SHIPPED_CAMERAS,
     AttachmentTable,
     BladeTable,
     CoreTable,
@@ -49,6 +52,7 @@ from scalpel_sim.scene.schema import (
     WorldTable,
 )
 from scalpel_sim.scene.task_table import TaskTable, check_task
+from scalpel_sim.scene.vary_table import VaryTable, check_vary
 from scalpel_sim.strokes.kind import StrokeTable, stroke_called
 from scalpel_sim.strokes.scene_stroke import check_strokes
 from scalpel_sim.tables.values import NameOfScene, Positive, Text, TomlTable
@@ -109,6 +113,12 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     """Where pages and pictures show it from, the first of them at the start."""
     task: TaskTable | None = None
     """The task that a run is scored by; without, it has no score."""
+    act: ActTable | None = None
+    """The actions of a policy. A script or a hand ignores it, and the two that follow."""
+    observe: ObserveTable | None = None
+    """Quantities and pictures that a policy is shown."""
+    vary: tuple[VaryTable, ...] = ()
+    """Numbers that are drawn for each episode of a policy."""
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""
@@ -126,7 +136,11 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_rows("support", self.supports, check_support)
         check_rows("grasper", self.graspers, check_grasper)
         check_rows("view", self.views, check_view)
-        check_task(self.task, [each.name for each in self.graspers])
+        names = [each.name for each in self.graspers]
+        check_task(self.task, names)
+        check_act(self.act, names)
+        check_observe(self.observe, names, self._cameras, has_task=self.task is not None)
+        check_vary(self.vary, names, [row.between for row in self.interfaces], self.task)
 
     @property
     def bodies(self) -> tuple[OneOfBodiesTable, ...]:
@@ -137,6 +151,14 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     def stretched_by(self) -> float:
         """Fraction by which opposite held sides are pulled apart: none of several bodies."""
         return self.body.stretched_by if isinstance(self.body, HeldBodyTable) else 0.0
+
+    @property
+    def _cameras(self) -> tuple[str, ...] | None:
+        """Names of all cameras; None where a model of the user's own may have more."""
+        models = (self.arm.model, *(each.model for each in self.graspers))
+        if any(model is not None for model in models):
+            return None
+        return (*(view.name for view in self.views), *SHIPPED_CAMERAS)
 
     @property
     def _rows_of_parts(self) -> dict[str, Sequence[TomlTable]]:
@@ -226,7 +248,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
     @cached_property
     def _labelled_mesh(self) -> TetrahedralMesh:
         mesh = labelled(mesh_of_bodies(self.body), self.labels, self.bodies)
-        expect_parts(mesh, self.interfaces)
+        expect_parts(mesh, "interface", [row.between for row in self.interfaces])
+        expect_parts(mesh, "vary", [(row.label,) if row.label else () for row in self.vary])
         return mesh
 
     def held_nodes(self) -> BoolArray:
@@ -286,6 +309,9 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
             "graspers": [given_in(grasper) for grasper in self.graspers],
             "views": [given_in(view) for view in self.views],
             "task": None if self.task is None else to_builtins(self.task),
+            "act": None if self.act is None else to_builtins(self.act),
+            "observe": None if self.observe is None else to_builtins(self.observe),
+            "vary": [given_in(row) for row in self.vary],
             **_values(arm, "tissue_every", "coupling", "coupling_stiffness", "coupling_damping"),
             "passivity": arm.passivity,
             "seconds": self.seconds,

@@ -34,6 +34,11 @@ from tissue import CutSettings, SolverSettings
 DEFAULT_FOV = 38.0
 """Angle that a picture spans from its lower to its upper side, where a view gives none [deg]."""
 
+OVERVIEW, ENDOSCOPE = "overview", "endoscope"
+"""Names of the cameras that are always there."""
+
+SHIPPED_CAMERAS = (OVERVIEW, ENDOSCOPE)
+
 DEFAULT_MASS_SCALING = SolverSettings().mass_scaling or 0.0
 """Angular frequency above which nodes get mass, where a scene gives none [1/s]."""
 

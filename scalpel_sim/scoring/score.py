@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from bridge import InProcessLink
+from scalpel_sim.scene.arm_tables import BLADE_NAME
 from scalpel_sim.scene.task_table import SuccessTable
 from scalpel_sim.scoring.cut_terms import CutTerms
 from scalpel_sim.scoring.hand_terms import HandTerms
@@ -15,9 +16,6 @@ from tissue import BoolArray, Snapshot, Tissue
 
 CONTROL_STEP = 0.02
 """Time from one look at the tissue to the next [s]: a control step of a hand or a policy."""
-
-BLADE_NAME = "blade"
-"""Name of the blade in a task."""
 
 _AT_LEAST = ("covered", "removed", "exposed")
 """Terms of which success asks for that much; of others for no more."""
