@@ -150,6 +150,11 @@ class Grasper:
         """Open or close the jaws to a distance between the pads [m], with limited force."""
         self._control[0] = opening
 
+    @property
+    def wanted_opening(self) -> float:
+        """Distance between the pads to which the jaws are led [m]."""
+        return float(self._control[0])
+
     def put_to(self, opening: float) -> None:
         """Put the jaws, at once, where the distance between the pads is that [m]."""
         for jaw in self._jaws:

@@ -135,7 +135,7 @@ def project_arm_in(
         found = beside(place(stroke, boxes, preset, force=needed.force, trocar=trocar))
     placement, held = found
     frame = TissueFrame(origin=placement.tissue_origin)
-    others = [*held, *_in_world(around, frame)]
+    others = [*held, *standing_around(around, frame)]
     return StandingArms(placement.arm(others=others), frame, stroke, others, room)
 
 
@@ -175,7 +175,7 @@ def own_arm_in(
     boxes = around.boxes
     others: list[Standing] = [
         *arms_with_graspers(scene.graspers, motions, boxes, frame, None, rooms),
-        *_in_world(around, frame),
+        *standing_around(around, frame),
     ]
     start, damping = np.array(arm.data.qpos), damping_of_self_motion(arm)
     arm, _ = _own(scene, stroke.blade_length, firm_impedance(arm), others)
@@ -208,7 +208,7 @@ def _as_long(stroke: Stroke, length: float) -> Stroke:
     return resting_stroke(long.start) if stroke.is_led else long
 
 
-def _in_world(around: ArmSurroundings, frame: TissueFrame) -> list[Standing]:
+def standing_around(around: ArmSurroundings, frame: TissueFrame) -> list[Standing]:
     """Return a table and fixtures of the tissue's frame where they stand in the world."""
     world = TissueFrame(
         frame.rotation.T, frame.points_to_tissue(np.zeros(3))

@@ -11,6 +11,7 @@ from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.arm.standing import StandingFixture, Tabletop
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper
+from scalpel_sim.instruments.floating_arms import floating_arms_in
 from scalpel_sim.instruments.geom_coupling import GeomCoupling
 from scalpel_sim.instruments.scene_arms import (
     ArmSurroundings,
@@ -45,6 +46,7 @@ def prepare(
     *,
     is_led: bool = False,
     records: bool = True,
+    frame_seconds: float | None = None,
 ) -> Simulation:
     """Return the simulation of a scene, at its start.
 
@@ -59,6 +61,8 @@ def prepare(
         is_led: Whether a hand will lead the blade and the graspers: then they rest where their
             scripts start, and the arms stand where they reach around the body, as far as they do.
         records: Whether frames are recorded: see `Simulation.records`.
+        frame_seconds: Length of a frame of instruments that no arm carries, which are where their
+            hands are [s]: see `FloatingArm`. None: the arms of the scene carry them, at 1 kHz.
 
     Raises:
         ValueError: parts of the scene do not fit together; the message says which.
@@ -88,7 +92,9 @@ def prepare(
         name = free_name("floor", [fixture.name for fixture in fixtures])
         floor.append(floor_below(bounds, tissue.floor, name))
     around = ArmSurroundings(boxes, table, [*fixtures, *floor])
-    if scene.arm.model is None:
+    if frame_seconds is not None:
+        stands = floating_arms_in(scene, stroke, motions, around, frame_seconds)
+    elif scene.arm.model is None:
         stands = project_arm_in(scene, stroke, motions, around, needed)
     else:
         stands = own_arm_in(scene, stroke, motions, around)
@@ -96,6 +102,7 @@ def prepare(
         fall = stands.frame.vectors_to_world(np.array(scene.world.free_fall))
         stands.arm.model.opt.gravity[:] = fall
     _warn_of_weakness(needed, stands.arm)
+    floats = frame_seconds is not None
     standing = [each for each in stands.others if isinstance(each, StandingFixture)]
     simulation = Simulation(
         stands.arm,
@@ -103,9 +110,9 @@ def prepare(
         link,
         stands.frame,
         [each.fixture for each in standing],
-        tissue_every=scene.arm.tissue_every,
-        coupling=scene.virtual_coupling(),
-        passivity=scene.arm.passivity,
+        tissue_every=1 if floats else scene.arm.tissue_every,
+        coupling=None if floats else scene.virtual_coupling(),
+        passivity=scene.arm.passivity and not floats,
     )
     simulation.scene = scene
     simulation.records = records
