@@ -9,6 +9,7 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.meshing.gallbladder import gallbladder
+from scalpel_sim.meshing.graded import graded_block, lobe
 from scalpel_sim.scene.schema import PresetMaterialTable
 from scalpel_sim.tables.problems import check_keys
 from scalpel_sim.tables.values import (
@@ -30,7 +31,9 @@ from scalpel_sim.tables.values import (
 )
 from tissue import BoolArray, FloatArray, TetrahedralMesh
 
-BodyShape = Literal["organ", "gallbladder", "block", "lattice", "graded", "cylinder", "mesh"]
+BodyShape = Literal[
+    "organ", "gallbladder", "block", "lattice", "graded", "lobe", "cylinder", "mesh"
+]
 _SHAPES: tuple[BodyShape, ...] = get_args(BodyShape)
 
 USUAL_FIXED, USUAL_STRETCH = "left,right", 0.05
@@ -46,6 +49,7 @@ KEYS_OF_SHAPE = {
     "block": Kind(needed=("size", "cells")),
     "lattice": Kind(needed=("size", "cells")),
     "graded": Kind(needed=("along_x", "along_y", "along_z")),
+    "lobe": Kind(needed=("along_x", "along_y", "along_z")),
     "cylinder": Kind(needed=("radius", "height"), possible=("rings", "layers")),
     "mesh": Kind(needed=("file",), possible=("scale",)),
 }
@@ -59,13 +63,14 @@ class BodyTable(TomlTable, kw_only=True, frozen=True, dict=True):
     """`"organ"`, a liver lobe of 5,136 tetrahedra; `"gallbladder"`, one on its bed of liver, with
     fat and artery as labels, 4,852 tetrahedra; `"block"`; `"lattice"`, a block with a node in
     each cell too, for what is bent ([materials](materials.md#the-laws)); `"graded"`, a block of
-    cells of different sizes; `"cylinder"`; or `"mesh"`, a file."""
+    cells of different sizes; `"lobe"`, such a block rounded to a small lobe; `"cylinder"`;
+    or `"mesh"`, a file."""
     size: Size | None = None
     """Extent of a block or a lattice along x, y and z [m]."""
     cells: CellCounts | None = None
     """Number of its cells along x, y and z."""
     along_x: CellSizes | None = None
-    """Sizes of the cells of a graded block along x [m]."""
+    """Sizes of the cells of a graded block or a lobe along x [m]."""
     along_y: CellSizes | None = None
     """Sizes along y [m]."""
     along_z: CellSizes | None = None
@@ -232,8 +237,11 @@ def _mesh_of(body: BodyTable) -> TetrahedralMesh:
             return tissue.liver_lobe()
         case "gallbladder":
             return gallbladder()
-        case "graded":
-            return _graded_block(body)
+        case "graded" | "lobe":
+            assert body.along_x is not None
+            assert body.along_y is not None and body.along_z is not None
+            sizes = (body.along_x, body.along_y, body.along_z)
+            return graded_block(*sizes) if body.shape == "graded" else lobe(*sizes)
         case "cylinder":
             assert body.radius is not None and body.height is not None
             rings = body.rings or _RINGS
@@ -245,20 +253,3 @@ def _mesh_of(body: BodyTable) -> TetrahedralMesh:
     assert body.cells is not None and body.size is not None
     make = tissue.block if body.shape == "block" else tissue.lattice_block
     return make(body.cells, body.size)
-
-
-def _graded_block(body: BodyTable) -> TetrahedralMesh:
-    """Return a block whose layers of cells are of given sizes, with a corner at the origin."""
-    from tissue import block
-
-    assert body.along_x is not None and body.along_y is not None and body.along_z is not None
-    sizes = (body.along_x, body.along_y, body.along_z)
-    counts = [len(each) for each in sizes]
-    mesh = block(counts, [float(n) for n in counts])
-    places = [
-        np.interp(
-            mesh.positions[:, axis], np.arange(len(each) + 1), np.append(0.0, np.cumsum(each))
-        )
-        for axis, each in enumerate(sizes)
-    ]
-    return TetrahedralMesh(np.stack(places, axis=1), mesh.tetrahedra)
