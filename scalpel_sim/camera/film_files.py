@@ -31,6 +31,17 @@ _BY_FFMPEG: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 }
 """Encoders of ffmpeg for each kind of file, the best first, with what they are told."""
 
+_CODECS = {
+    "libx264": "h264",
+    "libopenh264": "h264",
+    "h264_videotoolbox": "h264",
+    "mpeg4": "mpeg4",
+    "libvpx-vp9": "vp9",
+    "libvpx": "vp8",
+    "libaom-av1": "av1",
+}
+"""Name of the coding of each encoder."""
+
 _BY_PILLOW = {".png": "PNG", ".apng": "PNG", ".gif": "GIF", ".webp": "WEBP"}
 
 _GIF_COLOURS = 255
@@ -80,17 +91,30 @@ def film_path(path: Path) -> tuple[Path, str]:
     return path, told
 
 
-def open_film(path: Path, size: PixelSize, fps: float) -> FilmFile:
+def open_film(
+    path: Path, size: PixelSize, fps: float, *, keyframe_every: int | None = None
+) -> FilmFile:
     """Return a film that is yet to be entered.
 
     Args:
         path: What `film_path` returned.
         size: Size of its frames [pixels].
         fps: Frames in a second.
+        keyframe_every: Number of frames from one that ffmpeg encodes by itself to the next; None:
+            as it likes.
     """
     if path.suffix.lower() in _BY_FFMPEG:
-        return _FilmByFfmpeg(path, size, fps)
+        return _FilmByFfmpeg(path, size, fps, keyframe_every)
     return _FilmByPillow(path, fps)
+
+
+def codec_of(suffix: str) -> str:
+    """Return the name of the coding of films of a suffix, which ffmpeg writes.
+
+    Raises:
+        RunError: there is no ffmpeg, or it has no encoder for such files.
+    """
+    return _CODECS[_encoder(suffix)[1]]
 
 
 def _encoder(suffix: str) -> Sequence[str]:
@@ -117,8 +141,9 @@ def _encoder(suffix: str) -> Sequence[str]:
 class _FilmByFfmpeg:
     """A film that ffmpeg encodes while it is made."""
 
-    def __init__(self, path: Path, size: PixelSize, fps: float) -> None:
+    def __init__(self, path: Path, size: PixelSize, fps: float, keyframe_every: int | None) -> None:
         self._path, self._size, self._fps = path, size, fps
+        self._told = () if keyframe_every is None else ("-g", str(keyframe_every))
 
     def __enter__(self) -> Self:
         suffix = self._path.suffix.lower()
@@ -129,7 +154,7 @@ class _FilmByFfmpeg:
         size = f"{self._size.width}x{self._size.height}"
         given = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", f"{self._fps:g}")
         command = ["ffmpeg", "-hide_banner", "-loglevel", "error", "-y", *given, "-i", "-"]
-        command += ["-an", "-vf", even, *_encoder(suffix)]
+        command += ["-an", "-vf", even, *_encoder(suffix), *self._told]
         command += ["-movflags", "+faststart"] if suffix == ".mp4" else []
         self._said = tempfile.TemporaryFile()
         # Ctrl-C is for the program, which then ends it.

@@ -1,0 +1,1 @@
+"""Datasets of demonstrations: runs that are done again, and written as policies are trained."""
