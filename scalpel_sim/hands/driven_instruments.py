@@ -75,7 +75,7 @@ class LiveInstrument(abc.ABC):
     @property
     def back(self) -> FloatArray:
         """Direction from what is led back along the instrument, world frame, shape (3,)."""
-        return self._frame.vectors_to_world(-self._axes()[1])
+        return self._frame.vectors_to_world(-self.axes[1])
 
     @property
     @abc.abstractmethod
@@ -105,12 +105,13 @@ class LiveInstrument(abc.ABC):
         """
         if moves and self._record.has_begun:  # the record begins at the start
             if self.pose.step():
-                self._take_edge(self._edge_at(self.pose.middle, self._axes()))
+                self._take_edge(self._edge_at(self.pose.middle, self.axes))
             self._move_jaws()
         self._record.add(t, [*self.numbers, float(is_engaged)])
 
-    def _axes(self) -> FloatArray:
-        """Return the directions across the edge, along it and back from it, tissue frame."""
+    @property
+    def axes(self) -> FloatArray:
+        """Directions across the edge, along it and back from it, tissue frame, shape (3, 3)."""
         axes = np.empty(9)
         mujoco.mju_quat2Mat(axes, self.pose.rotation)
         return axes.reshape(3, 3).T
@@ -179,7 +180,7 @@ class LiveBlade(LiveInstrument):
     @property
     def normal(self) -> FloatArray:
         """See `LiveInstrument.normal`."""
-        return self._frame.vectors_to_world(self._axes()[0])
+        return self._frame.vectors_to_world(self.axes[0])
 
     def close_jaws(self, closed: bool) -> None:
         """Do nothing: it has none."""
@@ -238,7 +239,7 @@ class LiveGrasper(LiveInstrument):
     @property
     def normal(self) -> FloatArray:
         """See `LiveInstrument.normal`."""
-        return self._frame.vectors_to_world(self._axes()[2])
+        return self._frame.vectors_to_world(self.axes[2])
 
     def close_jaws(self, closed: bool) -> None:
         """Close or open the jaws."""

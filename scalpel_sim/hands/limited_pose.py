@@ -61,7 +61,8 @@ class LimitedPose:
         """Time that passes in a frame, for speeds and for the time constant [s]."""
         self.following_time = FOLLOWING_TIME
         """Time constant with which it follows [s]."""
-        self._workspace = workspace
+        self.workspace = workspace
+        """Lowest and highest place of its middle [m], shape (2, 3)."""
         self._way: deque[FloatArray] = deque()
         self._is_limited = False
 
@@ -69,7 +70,7 @@ class LimitedPose:
         """Move the wanted pose by a displacement [m], as far as it may be ahead."""
         self._way.clear()
         requested = self.wanted + by
-        ahead = np.clip(requested, *self._workspace) - self.middle
+        ahead = np.clip(requested, *self.workspace) - self.middle
         self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
         self._is_limited |= math.dist(requested.tolist(), self.wanted.tolist()) > ARRIVED
 
@@ -78,7 +79,7 @@ class LimitedPose:
 
         Unlike a displacement a place may be far ahead: there it stops.
         """
-        place = np.clip(to, *self._workspace)
+        place = np.clip(to, *self.workspace)
         self._is_limited |= math.dist(to.tolist(), place.tolist()) > ARRIVED
         self._way.append(place)
         self._shorten_way()
@@ -102,7 +103,7 @@ class LimitedPose:
             rotation: How it is to be turned (w, x, y, z).
         """
         self._way.clear()
-        np.clip(middle, *self._workspace, out=self.wanted)
+        np.clip(middle, *self.workspace, out=self.wanted)
         self.wanted_rotation[:] = rotation
         self._is_limited |= math.dist(middle.tolist(), self.wanted.tolist()) > ARRIVED
 
@@ -119,7 +120,7 @@ class LimitedPose:
         way, turn = self.wanted - self.middle, np.empty(3)
         mujoco.mju_subQuat(turn, self.wanted_rotation, self.rotation)
         distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
-        share = 1.0 - math.exp(-self.dt / self.following_time)
+        share = self.share()
         if distance > ARRIVED:
             most = MOST_SPEED * self.dt / distance
             self._is_limited |= most < share
@@ -130,6 +131,10 @@ class LimitedPose:
             mujoco.mju_quatIntegrate(self.rotation, turn, min(share, most))
             mujoco.mju_normalize4(self.rotation)
         return distance > ARRIVED or angle > ARRIVED_TURN
+
+    def share(self) -> float:
+        """Return the share of the way to the wanted pose that it goes in this frame."""
+        return 1.0 - math.exp(-self.dt / self.following_time)
 
     def _shorten_way(self) -> None:
         """Leave out the oldest places of a way that is too long."""

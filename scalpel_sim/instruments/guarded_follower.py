@@ -12,9 +12,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from bridge import TissueFrame, TissueLink
-from scalpel_sim.arm.hand import Hand
 from scalpel_sim.instruments.line_pursuit import LastLook, LinePursuit
-from scalpel_sim.instruments.stroke_follower import NO_SHIFT, StrokeFollower
+from scalpel_sim.instruments.stroke_follower import NO_SHIFT, Commanded, StrokeFollower
 from scalpel_sim.strokes.asked import n_large
 from scalpel_sim.strokes.guard import LONGEST_PURSUIT, Guard
 from scalpel_sim.strokes.sequence import through_air
@@ -112,7 +111,7 @@ class GuardedFollower:
     """Leads a hand along strokes with guards. See `Controller`.
 
     Args:
-        hand: Holds a blade already.
+        hand: Holds a blade already, or shows where to lead one.
         stroke: The path of the blade, tissue frame, with its guards.
         frame: Where the tissue lies in the world.
         link: The tissue.
@@ -122,7 +121,7 @@ class GuardedFollower:
 
     def __init__(
         self,
-        hand: Hand,
+        hand: Commanded,
         stroke: Stroke,
         frame: TissueFrame,
         link: TissueLink,

@@ -1,9 +1,11 @@
 """Leads a hand along a stroke, by one call of a kernel in each frame."""
 
+from typing import Protocol
+
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.arm.hand import Hand, lead_to
+from scalpel_sim.arm.hand import HandCommand, lead_to
 from scalpel_sim.quaternions import Vector
 from scalpel_sim.strokes.path import pose_on_path
 from scalpel_sim.strokes.stroke import Stroke
@@ -14,16 +16,22 @@ NO_SHIFT: Vector = (0.0, 0.0, 0.0)
 """The blade is led where the path has it."""
 
 
+class Commanded(Protocol):
+    """A hand, or what only shows where one is to be."""
+
+    command: HandCommand
+
+
 class StrokeFollower:
     """Does what `hand.follow(frame.segment_to_world(stroke.pose(t)))` does, or beside that pose.
 
     Args:
-        hand: Holds a blade already.
+        hand: Holds a blade already, or shows where to lead one.
         stroke: The path of the blade, tissue frame.
         frame: Where the tissue lies in the world.
     """
 
-    def __init__(self, hand: Hand, stroke: Stroke, frame: TissueFrame) -> None:
+    def __init__(self, hand: Commanded, stroke: Stroke, frame: TissueFrame) -> None:
         self._path = stroke.path
         self._placement = np.vstack((frame.rotation, frame.origin))
         self._command = hand.command

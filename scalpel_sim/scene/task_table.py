@@ -90,6 +90,47 @@ class SuccessTable(TomlTable, kw_only=True, frozen=True):
     """Least share of a camera's picture that shows the target."""
 
 
+class RewardTable(TomlTable, kw_only=True, frozen=True):
+    """`[task.reward]`: weights of the terms.
+
+    The reward of a control step is the increase of their weighted sum: no way there and back pays.
+    """
+
+    covered: Finite = 0.0
+    """Weight of the share of the plan that is cut."""
+    off_plan: Finite = 0.0
+    """Weight of the area that is cut off the plan [1/m2]."""
+    path_error: Finite = 0.0
+    """Weight of the root mean square of the distance of the cut from the plan [1/m]."""
+    depth_error: Finite = 0.0
+    """Weight of the mean error of depth [1/m]."""
+    spared_area: Finite = 0.0
+    """Weight of the area that is cut in what is to be spared [1/m2]."""
+    strain_above: Finite = 0.0
+    """Weight of the volume that was stretched beyond its limit [1/m3]."""
+    force_above: Finite = 0.0
+    """Weight of the greatest force beyond its limit [1/N]."""
+    impulse: Finite = 0.0
+    """Weight of the integral of the forces over time [1/(N s)]."""
+    removed: Finite = 0.0
+    """Weight of the share of the target that is cut out."""
+    healthy: Finite = 0.0
+    """Weight of the volume of other tissue that is cut out with it [1/m3]."""
+    exposed: Finite = 0.0
+    """Weight of the share of a camera's picture that shows the target."""
+    work: Finite = 0.0
+    """Weight of the work of the blade [1/J]."""
+    time: Finite = 0.0
+    """Weight of the time [1/s]."""
+    success: Finite = 0.0
+    """Worth of success, once."""
+
+    def weights(self) -> dict[str, float]:
+        """Return the weight of each term that has one, by its name."""
+        given = {name: getattr(self, name) for name in self.__struct_fields__}
+        return {name: weight for name, weight in given.items() if weight and name != "success"}
+
+
 class TaskTable(TomlTable, kw_only=True, frozen=True):
     """`[task]`: the task that a run of the scene is scored by."""
 
@@ -122,6 +163,8 @@ class TaskTable(TomlTable, kw_only=True, frozen=True):
     """Time within which it is to be done [s]; any without."""
     success: SuccessTable = field(default_factory=SuccessTable)
     """Conditions of success."""
+    reward: RewardTable = field(default_factory=RewardTable)
+    """Weights of the terms, for a policy that learns."""
 
 
 def check_task(task: TaskTable | None, graspers: Sequence[str]) -> None:

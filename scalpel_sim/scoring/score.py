@@ -69,6 +69,11 @@ class Score:
         """Which places of the plan are cut, shape (n,). A copy."""
         return self.cut.is_covered
 
+    @property
+    def asks(self) -> bool:
+        """Whether the task has a condition of success."""
+        return bool(_asked(self._yardstick.task.success))
+
     def after_frame(self, simulation: Simulation) -> None:
         """Count a frame, and where it ends a control step, that."""
         dt, blade, of_blade = simulation.dt, simulation.blade, self.hands[0]

@@ -1,0 +1,187 @@
+"""`TissueEnv`: a task of a scene as an environment of Gymnasium."""
+
+from pathlib import Path
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Dict
+
+from scalpel_sim.camera.camera import Camera
+from scalpel_sim.errors import UsageError
+from scalpel_sim.learning.episode import Episode, Outcome
+from scalpel_sim.learning.images import ImageTaker
+from scalpel_sim.scene.read import read_scene, scene_called
+from scalpel_sim.scene.scene import Scene
+from tissue import FloatArray
+
+OBSERVED_FORMS = ("state", "flat", "images", "all")
+"""Forms of an observation: arrays by name, all numbers in one row, images, or both."""
+
+RENDER_MODES = ("rgb_array", "depth_array", "rgbd_tuple")
+"""Ways to render."""
+
+ObservedArrays = dict[str, np.ndarray] | FloatArray
+"""An observation."""
+
+
+class TissueEnv(gymnasium.Env[Any, Any]):
+    """A task of a scene as an environment of Gymnasium.
+
+    An action moves and turns the hands that `[act]` names; each number is within plus or minus 1.
+    What is seen is said by `[observe]`, what is paid by `[task.reward]`, and what differs from
+    episode to episode by `[[vary]]`: see `docs/learning.md`.
+
+    Args:
+        scene: A scene with a task: its name, a TOML file, or the scene itself.
+        obs: One of `OBSERVED_FORMS`.
+        arm: `kinematic` or `full`; None: what `[act]` says.
+        render_mode: One of `RENDER_MODES`, or None.
+        camera: Camera that renders: see `scalpel_sim.Camera`. None: the first view.
+        width: Width of rendered images [pixels].
+        height: Height of rendered images [pixels].
+
+    Raises:
+        UsageError: there is no such scene or camera, it has no task, or an argument has no such
+            value.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012  # as the base class has it
+        "render_modes": list(RENDER_MODES),
+        "render_fps": 50,
+    }
+
+    def __init__(
+        self,
+        scene: str | Path | Scene,
+        obs: str = "state",
+        arm: str | None = None,
+        render_mode: str | None = None,
+        *,
+        camera: str | None = None,
+        width: int = 480,
+        height: int = 360,
+    ) -> None:
+        if obs not in OBSERVED_FORMS:
+            raise UsageError(f"obs is '{obs}'; it must be one of {', '.join(OBSERVED_FORMS)}")
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise UsageError(
+                f"render_mode is '{render_mode}'; it must be one of {', '.join(RENDER_MODES)}"
+            )
+        self.episode = Episode(task_scene(scene), arm)
+        """The task itself, with its simulation."""
+        self.render_mode = render_mode
+        self.metadata = self.metadata | {
+            "render_fps": round(1.0 / self.episode.act_table.step),
+        }
+        self._obs = obs
+        self._images = ImageTaker(self.episode) if obs in ("images", "all") else None
+        self._rendered = (camera, width, height)
+        self._camera: Camera | None = None
+        n = len(self.episode.action_names)
+        self.action_space = Box(-1.0, 1.0, (n,), np.float32)
+        self.observation_space = self._space()
+
+    def _space(self) -> gymnasium.Space[Any]:
+        """Return the space of observations."""
+        shapes = self.episode.shapes
+        rows = {name: (each.low.ravel(), each.high.ravel()) for name, each in shapes.items()}
+        if self._obs == "flat":
+            low, high = (np.concatenate(ends) for ends in zip(*rows.values(), strict=True))
+            return Box(low.astype(np.float32), high.astype(np.float32))
+        spaces: dict[str, gymnasium.Space[Any]] = {}
+        if self._obs in ("state", "all"):
+            spaces = {
+                name: Box(low.astype(np.float32), high.astype(np.float32))
+                for name, (low, high) in rows.items()
+            }
+        if self._images is not None:
+            spaces |= {
+                name: Box(each.low, each.high, each.shape, each.kind)
+                for name, each in self._images.shapes.items()
+            }
+        return Dict(spaces)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[ObservedArrays, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: Seed of all that is random; None: as before.
+            options: None are known.
+
+        Raises:
+            UsageError: there is no such option.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise UsageError(f"reset has no option '{next(iter(options))}'")
+        self.episode.reset(self.np_random)
+        return self._observed(), self._info(None)
+
+    def step(
+        self, action: FloatArray
+    ) -> tuple[ObservedArrays, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Do an action over a control step; see `Episode.act`."""
+        outcome = self.episode.act(action)
+        observed, info = self._observed(), self._info(outcome)
+        return observed, outcome.reward, outcome.terminated, outcome.truncated, info
+
+    def _observed(self) -> ObservedArrays:
+        """Return the observation after the last control step."""
+        if self._obs == "flat":
+            return np.concatenate([each.ravel() for each in self.episode.observation.values()])
+        found: dict[str, np.ndarray] = {}
+        if self._obs in ("state", "all"):
+            found = {name: each.ravel() for name, each in self.episode.observation.items()}
+        if self._images is not None:
+            found |= self._images.take()
+        return found
+
+    def _info(self, outcome: Outcome | None) -> dict[str, Any]:
+        """Return what is known besides."""
+        episode = self.episode
+        info: dict[str, Any] = {
+            "is_success": episode.is_success,
+            "score": episode.score.terms(),
+        }
+        if outcome is not None and outcome.failed:
+            info["failed"] = list(outcome.failed)
+        if outcome is not None and outcome.fault is not None:
+            info["fault"] = outcome.fault
+        return info
+
+    def render(self) -> Any:
+        """Return a picture of the present, as `render_mode` says; None without one."""
+        if self.render_mode is None:
+            return None
+        if self._camera is None:
+            name, width, height = self._rendered
+            self._camera = Camera(self.episode.simulation, name, width=width, height=height)
+        if self.render_mode == "rgb_array":
+            return self._camera.rgb()
+        if self.render_mode == "depth_array":
+            return self._camera.depth()
+        rgb, depth, _ = self._camera.image()
+        return rgb, depth
+
+    def close(self) -> None:
+        """Free what OpenGL holds."""
+        for each in (self._camera, self._images):
+            if each is not None:
+                each.close()
+        self._camera = None
+
+
+def task_scene(given: str | Path | Scene) -> Scene:
+    """Return a scene that is given by its name, or by its file.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    if isinstance(given, Scene):
+        return given
+    if isinstance(given, Path) or given.endswith(".toml"):
+        return read_scene(given)
+    return scene_called(given)

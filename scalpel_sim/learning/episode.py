@@ -1,0 +1,219 @@
+"""`Episode`: a task that a policy does, control step by control step. It needs no Gymnasium."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge import CouplingError
+from scalpel_sim.arm.arm import ArmError
+from scalpel_sim.arm.blade import BladeError
+from scalpel_sim.errors import UsageError
+from scalpel_sim.instruments.geom_coupling import GeomCouplingError
+from scalpel_sim.instruments.grip import GripError
+from scalpel_sim.instruments.scene_graspers import motions_of
+from scalpel_sim.learning.observations import Observer, Sensor, Shown
+from scalpel_sim.learning.policy_hand import PolicyHand
+from scalpel_sim.preparation.prepare import prepare
+from scalpel_sim.scene.act_table import ActTable, hands_led
+from scalpel_sim.scene.arm_tables import BLADE_NAME
+from scalpel_sim.scene.observe_table import ObserveTable, quantities_shown
+from scalpel_sim.scene.scene import Scene
+from scalpel_sim.scoring.score import Score
+from tissue import FloatArray, TissueError, Wrench
+
+KINEMATIC, FULL = "kinematic", "full"
+"""Levels: instruments that are where their hands are, or arms that MuJoCo simulates."""
+
+FAULTS = (TissueError, CouplingError, ArmError, BladeError, GripError, GeomCouplingError)
+"""Errors of a simulation that end an episode, and not the process."""
+
+_NEVER_MENDED = ("off_plan", "spared", "force", "strain_above", "healthy")
+"""Conditions that no later step makes hold again."""
+
+
+class Outcome(NamedTuple):
+    """Outcome of a control step."""
+
+    reward: float
+    """Increase of the weighted terms, and what success is worth."""
+    terminated: bool
+    """Whether the task is done, or can no longer be done."""
+    truncated: bool
+    """Whether its time is over, or the simulation failed."""
+    fault: str | None
+    """Error with which the simulation failed; None: it did not."""
+    failed: tuple[str, ...]
+    """Conditions of success that can no longer hold."""
+
+
+class Episode:
+    """A task of a scene, over and over: prepared once, and put back to its start by `reset`.
+
+    Args:
+        scene: A scene with a task.
+        arm: `KINEMATIC` or `FULL`; None: what `[act]` of the scene says.
+
+    Raises:
+        UsageError: the scene has no task, or there is no such level.
+        ValueError: parts of it do not fit together.
+    """
+
+    def __init__(self, scene: Scene, arm: str | None = None) -> None:
+        if arm not in (None, KINEMATIC, FULL):
+            raise UsageError(f"arm is '{arm}'; it must be {KINEMATIC} or {FULL}")
+        if scene.task is None:
+            raise UsageError(f"the scene '{scene.name}' has no [task]: there is nothing to learn")
+        self.scene, self.task = scene, scene.task
+        """The scene, and its task."""
+        self.act_table = scene.act or ActTable()
+        """Actions and their limits."""
+        self.arm = arm or self.act_table.arm
+        """`KINEMATIC` or `FULL`."""
+        step = self.act_table.step
+        self.simulation = simulation = prepare(
+            scene,
+            is_led=True,
+            records=False,
+            frame_seconds=step if self.arm == KINEMATIC else None,
+        )
+        """The simulation."""
+        self.motions = motions_of(scene.graspers)
+        """Motions of the graspers in the scene's script."""
+        names = [each.name for each in scene.graspers]
+        led = hands_led(self.act_table, names)
+        self.hand = PolicyHand(simulation, self.act_table, led, self.motions)
+        """The hand that the actions lead."""
+        self.hand.take_over(simulation)
+        observe = scene.observe or ObserveTable()
+        has_plan = self.score.plan is not None
+        self._observer = Observer(
+            simulation, quantities_shown(observe, names, has_plan=has_plan), step
+        )
+        self._sensor = observe.sensor
+        self.n_steps = 0
+        """Control steps of this episode so far."""
+        self.fault: str | None = None
+        """Error with which the simulation failed; None: it did not."""
+        self.is_success = False
+        """Whether all conditions of success held after the last control step."""
+        self._weights, self._potential = self.task.reward.weights(), 0.0
+        self._observation: dict[str, FloatArray] = {}
+        self._rest()  # a record begins with a frame at rest
+        simulation.note_start()
+
+    @property
+    def score(self) -> Score:
+        """The score so far."""
+        score = self.simulation.score
+        assert isinstance(score, Score)
+        return score
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Name of each number of an action, which is within plus or minus 1."""
+        return self.hand.action_names
+
+    @property
+    def shapes(self) -> dict[str, Shown]:
+        """Shape and bounds of each array of an observation."""
+        return self._observer.shapes()
+
+    @property
+    def max_steps(self) -> int | None:
+        """Control steps after which the time of the task is over; None: it has none."""
+        seconds = self.task.seconds
+        return None if seconds is None else math.ceil(seconds / self.act_table.step)
+
+    def reset(self, rng: np.random.Generator) -> dict[str, FloatArray]:
+        """Begin an episode; return the first observation.
+
+        Args:
+            rng: All that is random is drawn from it.
+        """
+        self.simulation.reset()
+        self.n_steps, self.fault, self.is_success = 0, None, False
+        self._observer.begin(Sensor(self._sensor, self.act_table.step, rng))
+        self._potential = self._weighted()
+        self._observation = self._observer.now()
+        return self._observation
+
+    def act(self, action: FloatArray) -> Outcome:
+        """Do an action over a control step.
+
+        Args:
+            action: Numbers within plus or minus 1 in the order of `action_names`; others are
+                clipped.
+
+        Raises:
+            ValueError: it has another shape, or a number is not finite.
+        """
+        action = np.asarray(action, np.float64)
+        if action.shape != (len(self.action_names),) or not np.isfinite(action).all():
+            raise ValueError(
+                f"an action of '{self.scene.name}' is {len(self.action_names)} finite numbers, "
+                f"not {action.tolist()}"
+            )
+        simulation = self.simulation
+        if self.fault is not None:
+            raise ValueError("the simulation has failed in this episode: call reset()")
+        self.hand.obey(action, self._wrenches())
+        total, peak = np.zeros(6), 0.0
+        try:
+            for _ in range(self.hand.n_frames):
+                simulation.step()
+                total += self._felt()
+                peak = max(peak, self._force())
+        except FAULTS as error:
+            self.fault = " ".join(str(error).split())
+            return Outcome(0.0, False, True, self.fault, ())
+        self.n_steps += 1
+        self._observation = self._observer.after_step(total / self.hand.n_frames, peak)
+        return self._judged()
+
+    @property
+    def observation(self) -> dict[str, FloatArray]:
+        """Observation after the last control step, by name, single precision."""
+        return self._observation
+
+    def _judged(self) -> Outcome:
+        """Judge the control step that was done."""
+        failed = self.score.failed() or []
+        now = self._weighted()
+        reward, self._potential = now - self._potential, now
+        self.is_success = self.score.asks and not failed
+        if self.is_success:
+            reward += self.task.reward.success
+        never = tuple(name for name in failed if name in _NEVER_MENDED)
+        late = self.max_steps is not None and self.n_steps >= self.max_steps
+        ended = self.is_success or bool(never)
+        return Outcome(reward, ended, late and not ended, None, never)
+
+    def _weighted(self) -> float:
+        """Return the weighted sum of the terms now."""
+        terms = self.score.terms()
+        return sum(weight * terms.get(name, 0.0) for name, weight in self._weights.items())
+
+    def _rest(self) -> None:
+        """Do a control step at rest."""
+        for _ in range(self.hand.n_frames):
+            self.simulation.step()
+
+    def _wrenches(self) -> dict[str, Wrench]:
+        """Return the wrench on each instrument, world frame."""
+        simulation = self.simulation
+        found = {each.name: each.wrench for each in simulation.graspers}
+        return {BLADE_NAME: simulation.blade.wrench, **found}
+
+    def _force(self) -> float:
+        """Return the force on the blade in the last frame [N]: of mean and end the larger."""
+        result = self.simulation.bridge.result
+        if result is None:
+            return 0.0
+        return max(math.hypot(*each.numbers[:3]) for each in (result.wrench, result.wrench_t1))
+
+    def _felt(self) -> FloatArray:
+        """Return the wrench on the blade in the last frame, about its tip, tool frame, (6,)."""
+        numbers = np.array(self.simulation.blade.wrench.numbers[:6]).reshape(2, 3)
+        frame, axes = self.simulation.frame, self.hand.blade.axes
+        return np.concatenate([axes @ (frame.rotation.T @ each) for each in numbers])

@@ -1,0 +1,109 @@
+"""Environments of Gymnasium pass its checker without a warning, and are registered."""
+
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import scalpel_sim.learning
+from scalpel_sim.errors import UsageError
+from scalpel_sim.learning import Expert, TissueEnv
+from scalpel_sim.learning.registration import OWN_SCENE, id_of
+from scalpel_sim.scene.read import TASK_SCENES
+from tests.scalpel_sim.learning.little_task import little_task
+
+__all__ = ["little_task"]
+
+pytestmark = pytest.mark.filterwarnings("error:.*WARN:UserWarning")
+
+FIVE_LINES = """
+import gymnasium, scalpel_sim.learning
+env = gymnasium.make("scalpel_sim/Incise-v0")
+observation, info = env.reset(seed=0)
+observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+print(sorted(observation), reward, terminated, truncated, sorted(info["score"])[:2])
+"""
+
+
+@pytest.mark.parametrize("obs", ["state", "flat"])
+def test_the_checker_of_gymnasium_finds_nothing(little_task, obs):
+    env = gymnasium.make(OWN_SCENE, scene=little_task, obs=obs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+
+
+def test_the_checker_finds_nothing_where_images_are_shown(little_task):
+    env = gymnasium.make(OWN_SCENE, scene=little_task, obs="all", render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+    observed, _ = env.reset(seed=0)
+    assert observed["overview_rgb"].shape == (36, 48, 3)
+    assert observed["overview_segmentation"].shape == (36, 48, 1)
+    assert len(np.unique(observed["overview_rgb"])) > 20
+    assert env.render().shape == (360, 480, 3)
+    env.close()
+
+
+def test_each_task_has_an_id_with_its_version():
+    assert id_of("incise_taut-v0") == "scalpel_sim/InciseTaut-v0"
+    for task in TASK_SCENES:
+        assert gymnasium.spec(id_of(task)).kwargs == {"scene": task}
+
+
+def test_five_lines_run_a_step_of_an_episode():
+    done = subprocess.run(
+        [sys.executable, "-c", FIVE_LINES], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("['blade', 'depth', 'target', 'wrench'] ")
+
+
+def test_an_expert_succeeds_and_info_says_how(little_task):
+    env = TissueEnv(little_task, "flat")
+    env.reset(seed=3)
+    expert = Expert(env.episode)
+    ended = False
+    while not ended:
+        _, _, ended, truncated, info = env.step(expert.action())
+        assert not truncated
+    assert info["is_success"] and info["score"]["covered"] >= 0.9
+
+
+def test_wrong_arguments_are_told(little_task):
+    for given, told in (
+        ({"obs": "pixels"}, "obs is 'pixels'; it must be one of state, flat"),
+        ({"render_mode": "ascii"}, "render_mode is 'ascii'"),
+        ({"arm": "half"}, "arm is 'half'; it must be kinematic or full"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            TissueEnv(little_task, **given)
+    with pytest.raises(UsageError, match="no scene is called 'incise'"):
+        TissueEnv("incise")
+    with pytest.raises(UsageError, match="reset has no option 'speed'"):
+        TissueEnv(little_task).reset(options={"speed": 1})
+
+
+def test_without_gymnasium_one_line_says_what_installs_it():
+    program = (
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "from scalpel_sim.learning.episode import Episode\n"
+        "import scalpel_sim.learning\n"
+        "try: scalpel_sim.learning.TissueEnv\n"
+        "except ImportError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "needs Gymnasium: pip install 'scalpel-sim[learn]'" in done.stdout
+
+
+def test_importing_the_package_registers_without_a_compiler():
+    program = "import sys, scalpel_sim.learning; print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "False\n", done.stderr
+    assert scalpel_sim.learning.Expert is Expert
