@@ -37,7 +37,7 @@ _RULES = StateRules(
     packages=frozenset({"bridge", "scalpel_sim"}),
     kept=frozenset(
         {"Scene", "Recording", "Stroke", "GraspMotion", "Fixtures", "ArmGeom"}
-        | {"Yardstick", "StrainLimit"}
+        | {"Yardstick", "StrainLimit", "TargetOutside", "TaskCamera"}
     ),
     derived={"Grip._views": _none},
     own=frozenset(
@@ -47,7 +47,6 @@ _RULES = StateRules(
             *("_shared", "_groups", "_rows", "samples", "_wall_times", "_start"),
         )
     )
-    | {"Score.look_for_target"}
     | frozenset(f"DeviceHand.{name}" for name in ("answers", "_hold", "_n_lost", "_looked_at")),
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the
     # stroke that was recorded.

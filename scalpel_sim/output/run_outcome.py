@@ -158,6 +158,12 @@ class RunOutcome:
         kinds = [STROKES[each["kind"]] for each in self.settings.get("strokes", ())]
         return bool(self.stroke.asked) or any(kind.ends_inside for kind in kinds)
 
+    @property
+    def was_to_touch(self) -> bool:
+        """Whether the blade is to touch the tissue, as far as that is known."""
+        kinds = [STROKES[each["kind"]] for each in self.settings.get("strokes", ())]
+        return not kinds or any(kind.meets for kind in kinds)
+
     def cut_between(self, start: float, end: float) -> float:
         """Return the area that was cut between two instants [m2]."""
         areas = self.recording.column("cut_area_m2")

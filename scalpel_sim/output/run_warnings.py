@@ -72,9 +72,9 @@ def warnings_of(outcome: RunOutcome) -> list[RunWarning]:
 def _untouched(outcome: RunOutcome) -> Iterator[RunWarning]:
     """Warn of a blade that never touched the tissue."""
     recording = outcome.recording
-    if not outcome.is_stroke_over or recording.column("anchored_length_m").any():
+    if not (outcome.is_stroke_over and outcome.was_to_touch):
         return
-    if recording.sizes("tissue_force").any():
+    if recording.column("anchored_length_m").any() or recording.sizes("tissue_force").any():
         return
     moved, _ = outcome.motion
     why = f": the body has moved by {_mm(moved)}" if _is_moved(outcome, moved) else ""

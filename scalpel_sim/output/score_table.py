@@ -72,7 +72,7 @@ def _tissue(score: dict[str, Any]) -> _Rows:
             f"{terms['removed']:.1%} of the target, {healthy:,.0f} mm\u00b3 of the rest",
         )
     if "exposed" in terms:
-        yield "exposed", f"{terms['exposed']:.1%} of the picture"
+        yield "exposed", f"{terms['exposed']:.1%} of the target"
 
 
 def _hands(score: dict[str, Any]) -> _Rows:

@@ -29,7 +29,7 @@ from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.planning import check_meets
-from scalpel_sim.strokes.scene_stroke import cuts_somewhere, stroke_through
+from scalpel_sim.strokes.scene_stroke import cuts_somewhere, meets_somewhere, stroke_through
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import TetrahedralMesh
 
@@ -77,7 +77,7 @@ def prepare(
     stroke = stroke_through(
         mesh, scene.strokes, tissue.material, scene.world.stop, body.rest_positions
     )
-    if not stroke.is_led:
+    if not stroke.is_led and meets_somewhere(scene.strokes):
         check_meets(stroke, mesh)
     motions = motions_of(scene.graspers)
     planned = stroke

@@ -25,7 +25,6 @@ from scalpel_sim.runs.repeated_scene import repeated_scene, sums_of_recorded
 from scalpel_sim.runs.resumption import RepeatedFrames, Resumption
 from scalpel_sim.runs.run_end import OpenRun, write_driven, write_end
 from scalpel_sim.runs.run_folder import Outputs
-from scalpel_sim.runs.seen_target import target_seen
 from scalpel_sim.runs.stop_signals import StopSignals
 from scalpel_sim.scene.checks import LONGEST_RUN
 from scalpel_sim.scene.scene import Scene
@@ -131,7 +130,6 @@ def perform(
         ) as outputs,
         StopSignals() as stop,
         outputs.replay_log() as log,
-        target_seen(simulation, prepared.scene.task),
     ):
         replay = ReplayWriter(
             simulation.arm.model,

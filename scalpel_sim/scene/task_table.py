@@ -87,7 +87,7 @@ class SuccessTable(TomlTable, kw_only=True, frozen=True):
     healthy: NotNegative | None = None
     """Greatest volume of other tissue that is cut out with it [m3]."""
     exposed: Share | None = None
-    """Least share of a camera's picture that shows the target."""
+    """Least share of the target that the camera sees."""
 
 
 class RewardTable(TomlTable, kw_only=True, frozen=True):
@@ -153,8 +153,8 @@ class TaskTable(TomlTable, kw_only=True, frozen=True):
     target: Label | None = None
     """Part of the body that is cut out, or laid bare."""
     camera: Label | None = None
-    """Camera in whose picture the target counts as exposed: endoscope, overview, a view of the
-    scene, or a camera of your MJCF. It draws every 0.02 s; nobody looks without."""
+    """Camera to which the target counts as exposed: a view of the scene, or a camera of your MJCF.
+    Nobody looks without."""
     spare: tuple[SpareTable, ...] = ()
     """Rows of what is to be left whole: [{label = "vessel", margin = 0.002}]."""
     limits: tuple[LimitTable, ...] = ()

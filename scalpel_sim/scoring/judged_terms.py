@@ -90,9 +90,7 @@ _TEXTS = {
         "Target cut out", "Share of the target that came away.", _share, is_least=True
     ),
     "healthy": _Text("Other tissue cut out", "What came away with the target.", _volume),
-    "exposed": _Text(
-        "Target in view", "Share of the camera's picture that shows it.", _share, is_least=True
-    ),
+    "exposed": _Text("Target in view", "Share of it that the camera sees.", _share, is_least=True),
     "time": _Text("Time", "Simulated time, from the start.", lambda value: f"{value:.2f} s"),
     "path_length": _Text(
         "Way of the instruments",

@@ -1,12 +1,13 @@
 """`Score`: how well a task is done so far, whoever leads the instruments."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from bridge import InProcessLink
 from scalpel_sim.scene.arm_tables import BLADE_NAME
 from scalpel_sim.scene.task_table import SuccessTable
 from scalpel_sim.scoring.cut_terms import CutTerms
+from scalpel_sim.scoring.exposure import Exposure, TaskCamera
 from scalpel_sim.scoring.hand_terms import HandTerms
 from scalpel_sim.scoring.plan import Plan
 from scalpel_sim.scoring.tissue_terms import PiecesTerm, StrainTerm
@@ -56,8 +57,8 @@ class Score:
         self._has_labels = len(simulation.link.describe().labels) > 1
         self._work_of_labels: tuple[float, ...] = ()
         self._exposed: float | None = None
-        self.look_for_target: Callable[[], float] | None = None
-        """Returns the share of a camera's picture that shows the target; None: nobody looks."""
+        self._exposure = _exposure_of(yardstick, simulation, body)
+        self._look_at_target(simulation)
 
     @property
     def plan(self) -> Plan | None:
@@ -95,14 +96,13 @@ class Score:
             self._work = (result.work_of_blade, result.work_of_cutting)
             if self._has_labels:
                 self._work_of_labels = tuple(result.cutting_of_labels.tolist())
-        if self.look_for_target is not None:
-            self._exposed = self.look_for_target()
         if self._link.n_cut_faces > self._n_faces:
             faces = self._link.cut_faces(since=self._n_faces)
             self._n_faces += faces.n
             self.cut.take(faces)
             self._pieces.look(self._link)
         self._look_at_strain()
+        self._look_at_target(simulation)
 
     def _look_at_strain(self) -> None:
         """Look where the tissue is stretched too far now, if it is in this process."""
@@ -110,11 +110,16 @@ class Score:
             for strain in self._strains:
                 strain.look(self._tissue)
 
+    def _look_at_target(self, simulation: Simulation) -> None:
+        """Look how much of the target its camera sees, if the tissue is in this process."""
+        if self._exposure is not None and self._tissue is not None:
+            self._exposed = self._exposure.look(self._tissue, simulation)
+
     def terms(self) -> dict[str, float]:
         """Return the terms as of the last control step, by name, in SI units.
 
         Those that are not known are left out: without a plan, a target, limits of strain or a
-        camera; and strain where the tissue is in another process.
+        camera; and strain and what is exposed where the tissue is in another process.
         """
         task, hands = self._yardstick.task, self.hands
         found = _terms_of_cut(self.cut, self.plan)
@@ -202,6 +207,19 @@ def _tissue_of(simulation: Simulation) -> Tissue | None:
     """Return the tissue of a simulation; None where it is in another process."""
     link = simulation.link
     return link.tissue if isinstance(link, InProcessLink) else None
+
+
+def _exposure_of(yardstick: Yardstick, simulation: Simulation, body: Snapshot) -> Exposure | None:
+    """Return what looks at the target of a task; None where it has no camera.
+
+    Raises:
+        UsageError: there is no such camera.
+    """
+    name, scene = yardstick.task.camera, simulation.scene
+    if name is None:
+        return None
+    views = () if scene is None else scene.views
+    return Exposure(TaskCamera(name, views, simulation.arm.model), body, yardstick.target)
 
 
 def _terms_of_cut(cut: CutTerms, plan: Plan | None) -> dict[str, float | None]:

@@ -52,8 +52,8 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     """Where an incision goes in and out, as shares of the body's length; [0.2, 0.73] without. In
     the other order it is drawn backwards."""
     points: RowsOfThree | None = None
-    """Where the tip goes [m]: two points or more, and one of a stab. Of a traced stroke, near the
-    skin of the body at rest: the tip goes beneath them."""
+    """Where the tip goes [m]: two points or more, and one of a stab or a rest. Of a traced stroke,
+    near the skin of the body at rest: the tip goes beneath them."""
     length: Positive | None = None
     """Length of the blade [m]; of a traced stroke three depths without, and 0.01 above the skin."""
     edge: ThreeNumbers | None = None
@@ -139,6 +139,8 @@ class StrokeKind(NamedTuple):
     """Whether the program places the stroke in the body; else the row says where it is [m]."""
     cuts: bool = True
     """Whether the stroke is to cut; a press is not."""
+    meets: bool = True
+    """Whether the blade is to touch the body: one that stays away is refused."""
     ends_inside: bool = False
     """Whether a stroke that cuts ends inside the body, so that its area is not known before."""
     problem: Callable[[StrokeTable], str | None] = no_problem

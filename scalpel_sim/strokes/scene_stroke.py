@@ -68,6 +68,11 @@ def cuts_somewhere(strokes: Sequence[StrokeTable]) -> bool:
     return any(STROKES[row.kind].cuts for row in strokes)
 
 
+def meets_somewhere(strokes: Sequence[StrokeTable]) -> bool:
+    """Return whether the blade is to touch the body in one of the strokes."""
+    return any(STROKES[row.kind].meets for row in strokes)
+
+
 def check_strokes(strokes: Sequence[StrokeTable]) -> None:
     """Check that each stroke exists, and has what its kind needs.
 

@@ -14,7 +14,8 @@ from scalpel_sim.strokes.drawn import (
 )
 from scalpel_sim.strokes.kind import LyingBody, StrokeTable, stroke_kind
 from scalpel_sim.strokes.stroke import Stroke, from_csv
-from tissue import FloatArray
+from scalpel_sim.strokes.timing import SAMPLE
+from tissue import BladeSegment, FloatArray
 
 _PER_LEG = 200
 """Points of a spline between two of those that it is given by."""
@@ -69,9 +70,7 @@ def _spline(points: FloatArray) -> FloatArray:
 
 def _no_single_point(row: StrokeTable) -> str | None:
     n_points = len(row.points or ())
-    if n_points == 1:
-        return None
-    return f"has {n_points} points; it has one, where the tip goes in"
+    return None if n_points == 1 else f"has {n_points} points; it has one"
 
 
 @stroke_kind(
@@ -86,6 +85,23 @@ def stab(row: StrokeTable, body: LyingBody) -> Stroke:
     point = np.array(row.points[0])
     inside = point - row.depth * edge_direction(row)
     return led_along(row, np.array([point, inside, point]), asks=False)
+
+
+@stroke_kind(
+    "the blade rests with its tip at a point, where it cuts nothing, while other hands work; "
+    "`pause` says for how long",
+    ("points", "length", "forward"),
+    ("edge",),
+    problem=_no_single_point,
+    cuts=False,
+    meets=False,
+)
+def rest(row: StrokeTable, body: LyingBody) -> Stroke:
+    """Return a stroke that stays at the point of its row."""
+    assert row.points is not None and row.length is not None and row.forward is not None
+    tip = np.array(row.points[0])
+    pose = BladeSegment(tip, tip + row.length * edge_direction(row), np.array(row.forward))
+    return Stroke([0.0, SAMPLE], [pose, pose], row.kind)
 
 
 @stroke_kind("poses over time, from a CSV file ([command line](command_line.md))", ("file",))

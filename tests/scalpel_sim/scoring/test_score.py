@@ -5,10 +5,9 @@ import json
 import pytest
 from msgspec import structs
 
-from scalpel_sim import SCENES, Camera, SimulationState, StrokeTable, WaypointTable, prepare
+from scalpel_sim import SCENES, SimulationState, StrokeTable, WaypointTable, prepare
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.read import read_scene
-from scalpel_sim.scene.schema import LabelTable, ViewTable
 from scalpel_sim.scene.task_table import LimitTable, SpareTable, SuccessTable, TaskTable
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from tests.scalpel_sim.scene.test_several_bodies import EXAMPLE
@@ -237,39 +236,3 @@ def test_success_of_a_plan_needs_one():
 def test_a_task_that_took_too_long_has_failed():
     task = structs.replace(TASK, success=SuccessTable(), seconds=0.5)
     assert done(slab(task)).failed() == ["seconds"]
-
-
-def test_a_camera_says_how_much_is_exposed():
-    task = TaskTable(kind="expose", target="tumour", success=SuccessTable(exposed=0.3))
-    simulation = prepare(structs.replace(SCENES["tumour"], task=task), records=False)
-    score = simulation.score
-    assert score.failed() == ["exposed"]
-    assert score.figures()["success"] is None
-    assert score.figures()["unknown"] == ["exposed"]
-    score.look_for_target = lambda: 0.4
-    score.look(simulation)
-    assert score.terms()["exposed"] == 0.4
-    assert score.failed() == []
-    assert score.figures()["success"] is True
-    score.look_for_target = lambda: 0.2
-    score.look(simulation)
-    assert score.figures()["success"] is False
-
-
-def test_the_share_of_a_camera_s_picture_is_that_of_the_surface_it_sees():
-    """From above, the slab fills the picture, and one half of it is the target."""
-    half = LabelTable(name="half", region="0,0,0:0.02,0.06,0.04")
-    above = ViewTable(
-        name="above",
-        eye=(0.02, 0.03, 0.54),
-        target=(0.02, 0.03, 0.04),
-        up=(0.0, 1.0, 0.0),
-        fov_degrees=2.0,
-    )
-    task = TaskTable(kind="expose", target="half")
-    simulation = prepare(slab(task, labels=(half,), views=(above,)), records=False)
-    with Camera(simulation, "above", width=64, height=64) as camera:
-        number = camera.ids["half"]
-        simulation.score.look_for_target = lambda: float((camera.segmentation() == number).mean())
-        simulation.score.look(simulation)
-    assert simulation.score.terms()["exposed"] == pytest.approx(0.5, abs=0.02)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.kinds import STROKES
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
 from tests.support.planned_strokes import plan_stroke
@@ -138,6 +139,14 @@ def test_a_stab_goes_in_along_the_edge_as_deep_as_asked_and_out_again():
     assert found[:, 2].min() == pytest.approx(0.08, abs=1e-5)
     np.testing.assert_allclose(found[:, :2], 0.0, atol=1e-12)
     assert stroke.asked is None
+
+
+def test_a_blade_that_rests_stays_where_it_is_and_may_be_away_from_the_body():
+    at = {"points": [(0.0, -0.2, 0.1)], "length": 0.02, "forward": (0.0, 1.0, 0.0)}
+    stroke = drawn("rest", **at)
+    assert not np.ptp(tips(stroke), axis=0).any()
+    assert stroke.asked is None
+    assert STROKES["stab"].meets and not STROKES["rest"].meets
 
 
 # Several in turn
