@@ -17,6 +17,7 @@ from tests.support.battery import (
     tally,
 )
 from tests.support.browser import browser, tab
+from tests.support.bytecode import keep_bytecode
 from tests.support.egl import renderer
 from tests.support.small_disk import small_disks
 
@@ -59,6 +60,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if are_all and not is_worker and not config.option.collectonly:
         from tests.kernels_ahead import compile_for_all_tests
 
+        keep_bytecode(config)
         compile_for_all_tests(config)
 
 

@@ -31,3 +31,13 @@ def test_importing_a_package_loads_nothing_heavy(package):
 def test_a_name_that_is_not_public_is_refused(package):
     with pytest.raises(AttributeError, match="no_such_name"):
         importlib.import_module(package).no_such_name  # noqa: B018 - the access is the test
+
+
+def test_the_process_that_serves_a_page_loads_no_simulation():
+    """It begins a second sooner, before a person can see anything."""
+    simulation = {"scalpel_sim.simulation", "tissue.tissue", "trimesh", "matplotlib"}
+    program = f"import sys, scalpel_sim.viewer.server; print({simulation} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "set()"

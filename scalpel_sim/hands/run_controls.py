@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 from bridge import InProcessLink
@@ -28,6 +28,7 @@ from scalpel_sim.hands.commands import (
     Turn,
     Undo,
 )
+from scalpel_sim.hands.run_results import RunResults
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.state import SimulationState
@@ -174,19 +175,6 @@ class Pace:
         """Forget the time that has passed since the last frame: it was not the simulation's."""
         self._due = self._since = self._clock()
         self._simulated = 0.0
-
-
-class RunResults(NamedTuple):
-    """Results of a run, for its page."""
-
-    figures: Sequence[tuple[str, str]]
-    """Labels and figures."""
-    folder: str
-    """Folder of its files."""
-    replay: str
-    """Path of the replay; empty: there is none."""
-    report: str = ""
-    """Path of the report; empty: there is none."""
 
 
 class RunControls:

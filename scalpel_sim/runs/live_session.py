@@ -14,7 +14,8 @@ from msgspec.structs import replace
 from bridge import LinkError
 from scalpel_sim.errors import RunError
 from scalpel_sim.hands.commands import Begin, Choose, Command, CutLines, End, Engage, Jaws, Reset
-from scalpel_sim.hands.run_controls import History, Pace, RunControls, RunResults
+from scalpel_sim.hands.run_controls import History, Pace, RunControls
+from scalpel_sim.hands.run_results import RunResults
 from scalpel_sim.hands.teleoperation import LiveHand
 from scalpel_sim.output.report import headline
 from scalpel_sim.output.summary import Summary

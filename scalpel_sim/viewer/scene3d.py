@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.hands.run_controls import RunResults
+from scalpel_sim.hands.run_results import RunResults
 from scalpel_sim.recording.columns import ForceParts
 from scalpel_sim.recording.recording import TERMS
 from scalpel_sim.scene.label_colours import LabelColours
