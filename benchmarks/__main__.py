@@ -17,6 +17,7 @@ from benchmarks.scene_costs import measure_scene_costs
 from benchmarks.strokes import random_strokes
 from benchmarks.studies.cutting_law import cutting_law
 from benchmarks.studies.mesh_study import mesh_study
+from benchmarks.studies.tasks import tasks
 from benchmarks.timing import Rounds, TurnWatch
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, exit_code, one_line
 from scalpel_sim.runs.console import say_error
@@ -60,6 +61,7 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "peers": peers,
     "mesh-study": mesh_study,
     "cutting-law": cutting_law,
+    "tasks": tasks,
 }
 """The benchmarks by name. Arguments `runs` and `watch` come from the options that all have."""
 
