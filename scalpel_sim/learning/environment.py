@@ -11,6 +11,7 @@ from scalpel_sim.camera.camera import Camera
 from scalpel_sim.errors import UsageError
 from scalpel_sim.learning.episode import Episode, Outcome
 from scalpel_sim.learning.images import ImageTaker
+from scalpel_sim.learning.live_page import LivePage
 from scalpel_sim.scene.read import read_scene, scene_called
 from scalpel_sim.scene.scene import Scene
 from tissue import FloatArray
@@ -18,7 +19,10 @@ from tissue import FloatArray
 OBSERVED_FORMS = ("state", "flat", "images", "all")
 """Forms of an observation: arrays by name, all numbers in one row, images, or both."""
 
-RENDER_MODES = ("rgb_array", "depth_array", "rgbd_tuple")
+HUMAN = "human"
+"""Way to render that opens the live page, and goes no faster than simulated time."""
+
+RENDER_MODES = ("rgb_array", "depth_array", "rgbd_tuple", HUMAN)
 """Ways to render."""
 
 ObservedArrays = dict[str, np.ndarray] | FloatArray
@@ -78,6 +82,7 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         self._images = ImageTaker(self.episode) if obs in ("images", "all") else None
         self._rendered = (camera, width, height)
         self._camera: Camera | None = None
+        self._page: LivePage | None = None
         n = len(self.episode.action_names)
         self.action_space = Box(-1.0, 1.0, (n,), np.float32)
         self.observation_space = self._space()
@@ -118,6 +123,8 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         if options:
             raise UsageError(f"reset has no option '{next(iter(options))}'")
         self.episode.reset(self.np_random)
+        if self.render_mode == HUMAN:
+            self._live_page()
         return self._observed(), self._info(None)
 
     def step(
@@ -125,6 +132,8 @@ class TissueEnv(gymnasium.Env[Any, Any]):
     ) -> tuple[ObservedArrays, SupportsFloat, bool, bool, dict[str, Any]]:
         """Do an action over a control step; see `Episode.act`."""
         outcome = self.episode.act(action)
+        if self.render_mode == HUMAN:
+            self._live_page().wait(self.episode.act_table.step)
         observed, info = self._observed(), self._info(outcome)
         return observed, outcome.reward, outcome.terminated, outcome.truncated, info
 
@@ -153,8 +162,8 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         return info
 
     def render(self) -> Any:
-        """Return a picture of the present, as `render_mode` says; None without one."""
-        if self.render_mode is None:
+        """Return a picture of the present, as `render_mode` says; None where it shows a page."""
+        if self.render_mode in (None, HUMAN):
             return None
         if self._camera is None:
             name, width, height = self._rendered
@@ -167,11 +176,22 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         return rgb, depth
 
     def close(self) -> None:
-        """Free what OpenGL holds."""
-        for each in (self._camera, self._images):
+        """Free what OpenGL holds, and end the page."""
+        for each in (self._camera, self._images, self._page):
             if each is not None:
                 each.close()
-        self._camera = None
+        self._camera = self._page = None
+
+    @property
+    def page_url(self) -> str | None:
+        """Address of the live page; None: none is open."""
+        return None if self._page is None else self._page.url
+
+    def _live_page(self) -> LivePage:
+        """Return the page, which opens now if it has not yet."""
+        if self._page is None:
+            self._page = LivePage(self.episode.simulation)
+        return self._page
 
 
 def task_scene(given: str | Path | Scene) -> Scene:

@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import time
+import urllib.request
 import warnings
 
 import gymnasium
@@ -48,6 +50,22 @@ def test_the_checker_finds_nothing_where_images_are_shown(little_task):
     assert len(np.unique(observed["overview_rgb"])) > 20
     assert env.render().shape == (360, 480, 3)
     env.close()
+
+
+def test_for_a_human_the_live_page_shows_the_episode_no_faster_than_it_is(little_task):
+    env = gymnasium.make(OWN_SCENE, scene=little_task, render_mode="human")
+    begin = time.monotonic()
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(env.action_space.sample())
+    assert time.monotonic() - begin >= 19 * 0.02
+    assert env.render() is None
+    url = env.unwrapped.page_url
+    with urllib.request.urlopen(url, timeout=30) as page:
+        assert b"little" in page.read()
+    env.close()
+    with pytest.raises(OSError):
+        urllib.request.urlopen(url, timeout=5)
 
 
 def test_each_task_has_an_id_with_its_version():
