@@ -169,17 +169,22 @@ def scaled(
     Raises:
         ValueError: there is no such quantity, or a factor is not finite and positive.
     """
-    numbers = np.stack([*_checked_factors(factors, int(where.sum()))], axis=1)
-    pairs = np.concatenate([rows[where][:, None].astype(np.float64), numbers], axis=1)
-    kinds, place = np.unique(pairs, axis=0, return_inverse=True)
+    numbers = dict(zip(factors, _checked_factors(factors, int(where.sum())), strict=True))
+    of_these = kind = rows[where]
+    for factor in numbers.values():  # a number for each row, and each factor, that occur together
+        if factor.strides == (0,):  # one for all
+            continue
+        values, place = np.unique(factor, return_inverse=True)
+        _, kind = np.unique(len(values) * kind + place.reshape(-1), return_inverse=True)
+    _, first, kind = np.unique(kind, return_index=True, return_inverse=True)
     old = table.rows()
-    new = old[kinds[:, 0].astype(np.int64)].copy()
+    new = old[of_these[first]].copy()
     columns = ("label", *table.quantities())
-    for i, name in enumerate(factors):
+    for name, factor in numbers.items():
         for column in SCALED[name]:
-            new[:, columns.index(column)] *= kinds[:, 1 + i]
+            new[:, columns.index(column)] *= factor[first]
     all_rows = rows.copy()
-    all_rows[where] = len(old) + place.reshape(-1)
+    all_rows[where] = len(old) + kind.reshape(-1)
     kept, compact = np.unique(all_rows, return_inverse=True)
     together, where_to = np.unique(np.concatenate([old, new])[kept], axis=0, return_inverse=True)
     return MaterialArrays.of_rows(together), where_to.reshape(-1)[compact.reshape(-1)]

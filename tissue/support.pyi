@@ -19,12 +19,14 @@ from .core.vec3 import norm as norm
 from .core.vec3 import scale as scale
 from .core.vec3 import sub as sub
 from .core.vec3 import vec3 as vec3
+from .geometry.line_entries import write_entries as write_entries
 from .geometry.surface_places import PlaceTree as PlaceTree
 from .geometry.surface_places import deepen as deepen
 from .geometry.surface_places import least_distance as least_distance
 from .geometry.surface_places import mark_near_triangles as mark_near_triangles
 from .geometry.surface_places import place_tree as place_tree
 from .geometry.surface_places import write_distances as write_distances
+from .geometry.surface_places import write_holders as write_holders
 from .geometry.triangle_places import count_places as count_places
 from .geometry.triangle_places import write_edge_places as write_edge_places
 from .geometry.triangle_places import write_parts as write_parts
@@ -75,6 +77,8 @@ __all__ = [
     "place_tree",
     "write_distances",
     "write_edge_places",
+    "write_entries",
+    "write_holders",
     "write_parts",
     "n_compiled_kernels",
     "new_whole_file",

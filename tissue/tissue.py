@@ -128,7 +128,7 @@ class Tissue(BodyView):
             TissueError: nothing holds the body, or a piece of it, against its weight and its loads,
                 its motion became unstable, or it does not come to rest. It is then where it was.
         """
-        self._steps.with_room(lambda: self._stages.take_edge(None))
+        self._steps.release_edge(lambda: self._stages.take_edge(None))
         return self._stages.settle(self.floor)
 
     def push(self, where: str | npt.ArrayLike | MaterialPoints, force: npt.ArrayLike) -> Load:
@@ -271,7 +271,7 @@ class Tissue(BodyView):
                 not finite and positive, or has another shape.
         """
         names = self.label_names
-        self._steps.with_room(lambda: scale_materials(self._stages, names, where, factors))
+        self._steps.release_edge(lambda: scale_materials(self._stages, names, where, factors))
 
     def move_supports(self, where: str | npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """Move fixed nodes at a velocity, from the next step on until it is given again.

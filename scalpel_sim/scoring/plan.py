@@ -104,7 +104,7 @@ def plan_of(task: TaskTable, stroke: Stroke, body: Snapshot) -> Plan | None:
         UsageError: the line or the surface is nowhere in the body.
     """
     if task.line is not None:
-        return _plan_of_line(task, body)
+        return plan_of_line(task, body, skin_at_rest(body))
     if task.surface is not None:
         path = Path(task.surface)
         return _read(path) if path.suffix == PLAN_SUFFIX else _plan_of_surface(task, path, body)
@@ -127,11 +127,19 @@ def _read(path: Path) -> Plan:
         raise UsageError(f"[task] surface: {path} holds no plan of a run ({error})") from error
 
 
-def _plan_of_line(task: TaskTable, body: Snapshot) -> Plan:
-    """Return the sheet below a line on the skin."""
+def plan_of_line(task: TaskTable, body: Snapshot, skin: BodySkin) -> Plan:
+    """Return the sheet below a line on the skin.
+
+    Args:
+        task: A task with a line.
+        body: The body.
+        skin: Its skin: see `skin_at_rest`.
+
+    Raises:
+        UsageError: the line misses the body.
+    """
     assert task.line is not None and task.depth is not None
-    into = _unit(task.into or DOWN)
-    skin = _skin_at_rest(body)
+    into = depth_direction(task)
     high = float(body.rest_positions[:, 2].max())
     corners = np.array([(*point, high) if len(point) == 2 else point for point in task.line])
     middles, ways = [], []
@@ -140,7 +148,7 @@ def _plan_of_line(task: TaskTable, body: Snapshot) -> Plan:
         n = max(math.ceil(float(np.linalg.norm(way)) / PLAN_SPACING), 1)
         middles.append(start + np.outer((np.arange(n) + 0.5) / n, end - start))
         ways.append(np.repeat(way[None] / n, n, axis=0))
-    line = np.array([_on_skin(place, skin, into) for place in np.concatenate(middles)])
+    line = _on_skin(np.concatenate(middles), skin, into)
     steps = np.concatenate(ways)
     widths = np.linalg.norm(steps, axis=1)
     n_deep = math.ceil(task.depth / PLAN_SPACING)
@@ -151,16 +159,21 @@ def _plan_of_line(task: TaskTable, body: Snapshot) -> Plan:
     return _plan(SampledSurface(places, normals, areas), line, into, body)
 
 
-def _on_skin(place: FloatArray, skin: BodySkin, into: FloatArray) -> FloatArray:
-    """Return where the skin is over or under a place of the line [m], shape (3,)."""
-    found = skin.entered_at(place, into)
-    if found is None:
-        at = ", ".join(f"{1e3 * x:.1f}" for x in place)
+def depth_direction(task: TaskTable) -> FloatArray:
+    """Return the unit vector in which the depth of a line is measured, shape (3,)."""
+    return _unit(task.into or DOWN)
+
+
+def _on_skin(places: FloatArray, skin: BodySkin, into: FloatArray) -> FloatArray:
+    """Return where the skin is over or under places of the line [m], shape (n, 3)."""
+    found = skin.entered_along(places, into)
+    if found.faces.min() < 0:
+        at = ", ".join(f"{1e3 * x:.1f}" for x in places[found.faces.argmin()])
         raise UsageError(
             f"[task] line misses the body at ({at}) mm: along the depth, "
             f"{[round(float(x), 3) for x in into]}, no skin is over or under it"
         )
-    return skin.rest_place(found)
+    return skin.rest_places(found)
 
 
 def _plan_of_surface(task: TaskTable, path: Path, body: Snapshot) -> Plan:
@@ -296,7 +309,7 @@ def _into_skin(line: FloatArray, normals: FloatArray, body: Snapshot) -> FloatAr
     """Return the direction into the skin along a line, in the surface where that is about flat."""
     from scipy.spatial import cKDTree  # 0.2 s, and only here
 
-    faces = _skin_at_rest(body).at_rest
+    faces = skin_at_rest(body).at_rest
     outward = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     outward /= np.linalg.norm(outward, axis=1)[:, None]
     _, nearest = cKDTree(faces.mean(axis=1)).query(line)
@@ -308,7 +321,7 @@ def _into_skin(line: FloatArray, normals: FloatArray, body: Snapshot) -> FloatAr
     return np.asarray(into / np.linalg.norm(into))
 
 
-def _skin_at_rest(body: Snapshot) -> BodySkin:
+def skin_at_rest(body: Snapshot) -> BodySkin:
     """Return the skin of a body at rest."""
     return BodySkin.of(TetrahedralMesh(body.rest_positions, body.tetrahedra))
 

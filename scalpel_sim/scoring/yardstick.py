@@ -7,8 +7,9 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene.task_table import SpareTable, TaskTable
-from scalpel_sim.scoring.plan import Plan, StationSearch, plan_of
+from scalpel_sim.scoring.plan import Plan, StationSearch, plan_of, plan_of_line
 from scalpel_sim.scoring.sampled_surface import PLAN_SPACING, SurfaceSearch, sampled_triangles
+from scalpel_sim.strokes.skin import BodySkin
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, IntArray, Snapshot, boundary_faces
 from tissue.support import labels_of_part
@@ -86,22 +87,45 @@ def yardstick_of(
         UsageError: the plan is nowhere in the body, or it has no part of a name.
     """
     plan = plan_of(task, stroke, body)
-    search = stations = None
     if plan is None:
         _expect_no_plan_needed(task)
-    else:
-        search = SurfaceSearch(plan.surface)
-        if len(plan.stations):
-            stations = StationSearch(plan.stations, plan.into, task.tolerance)
     return Yardstick(
         task,
         plan,
-        search,
-        stations,
+        *_searches(task, plan),
         tuple(_spared(row, _labels_of(row.label, names, "spare"), body) for row in task.spare),
         _strain_limits(task, body, names),
         () if task.target is None else _labels_of(task.target, names, "target"),
     )
+
+
+def with_line(yardstick: Yardstick, task: TaskTable, body: Snapshot, skin: BodySkin) -> Yardstick:
+    """Return a yardstick with another line; what else is compared is the same.
+
+    Args:
+        yardstick: Of a task that has a line.
+        task: The task, with the other line.
+        body: The body before any cut.
+        skin: Its skin at rest.
+
+    Raises:
+        UsageError: the line misses the body.
+    """
+    plan = plan_of_line(task, body, skin)
+    search, stations = _searches(task, plan)
+    return yardstick._replace(task=task, plan=plan, plan_search=search, station_search=stations)
+
+
+def _searches(
+    task: TaskTable, plan: Plan | None
+) -> tuple[SurfaceSearch | None, StationSearch | None]:
+    """Return what finds distances from a plan, and depths below its stations."""
+    if plan is None:
+        return None, None
+    search = SurfaceSearch(plan.surface)
+    if not len(plan.stations):
+        return search, None
+    return search, StationSearch(plan.stations, plan.into, task.tolerance)
 
 
 def _expect_no_plan_needed(task: TaskTable) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scalpel_sim.strokes.planned_sheet import mesh_edges
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BoolArray, FloatArray, IntArray, Snapshot
-from tissue.support import components
+from tissue.support import components, place_tree, write_holders
 
 _POSES, _PLACES = 400, 100
 """Poses of a stroke, and places along its edge, at which the body is looked up."""
@@ -260,20 +260,10 @@ def tetrahedra_at(places: FloatArray, body: Snapshot) -> tuple[IntArray, FloatAr
     Returns:
         Tetrahedra, shape (n,), and barycentric weights, shape (n, 4): 0 where there is none.
     """
-    from scipy.spatial import cKDTree  # 0.2 s, and only here
-
-    corners = body.positions[body.tetrahedra]
-    centres = corners.mean(axis=1)
-    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
-    near = cKDTree(places).query_ball_point(centres, radii)
-    tetrahedra = np.repeat(np.arange(len(near)), [len(found) for found in near])
-    candidates = np.array(list(itertools.chain.from_iterable(near)), np.int64)
-    sides = np.swapaxes(corners[tetrahedra, 1:] - corners[tetrahedra, :1], 1, 2)
-    offsets = places[candidates] - corners[tetrahedra, 0]
-    others = np.linalg.solve(sides, offsets[:, :, None])[:, :, 0]
-    weights = np.column_stack((1.0 - others.sum(axis=1), others))
-    inside = weights.min(axis=1) >= -_LEAST_WEIGHT
-    holders, shares = np.full(len(places), -1), np.zeros((len(places), 4))
-    holders[candidates[inside]] = tetrahedra[inside]
-    shares[candidates[inside]] = weights[inside]
-    return holders, shares
+    holders, weights = np.full(len(places), -1), np.zeros((len(places), 4))
+    if len(places):
+        positions = np.require(body.positions, np.float64, ["C", "W"])
+        tetrahedra = np.require(body.tetrahedra, np.int64, ["C", "W"])
+        tree = place_tree(places)
+        write_holders(tree, positions, tetrahedra, -_LEAST_WEIGHT, holders, weights)
+    return holders, weights

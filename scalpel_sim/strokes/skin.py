@@ -5,12 +5,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tissue import FloatArray, IntArray, TetrahedralMesh, boundary_faces
-
-_ROUNDING = 1e-9
-"""Weight by which a line may miss a face and still meet it: it may pass between two faces."""
-
-_ALONG = 1e-12
-"""Sine of the angle to a face below which a line runs along it, and meets no inside of it."""
+from tissue.support import write_entries
 
 
 class SkinPlace(NamedTuple):
@@ -20,6 +15,19 @@ class SkinPlace(NamedTuple):
     """Index of the face."""
     weights: FloatArray
     """Barycentric weights of its corners, shape (3,)."""
+
+
+class SkinPlaces(NamedTuple):
+    """Places on faces of the skin."""
+
+    faces: IntArray
+    """Index of the face of each; -1 where there is none, shape (n,)."""
+    weights: FloatArray
+    """Barycentric weights of its corners, shape (n, 3)."""
+
+    def place(self, i: int) -> SkinPlace | None:
+        """Return one of them; None where there is none."""
+        return SkinPlace(int(self.faces[i]), self.weights[i]) if self.faces[i] >= 0 else None
 
 
 class BodySkin(NamedTuple):
@@ -48,11 +56,16 @@ class BodySkin(NamedTuple):
             place: A place on the line [m], shape (3,).
             direction: Unit vector along the line, into the body, shape (3,).
         """
-        faces, ways, weights = _entries(self.at_rest, place, direction)
-        if len(faces) == 0:
-            return None
-        nearest = int(np.argmin(np.abs(ways)))
-        return SkinPlace(int(faces[nearest]), weights[nearest])
+        return self.entered_along(place[None], direction).place(0)
+
+    def entered_along(self, places: FloatArray, direction: FloatArray) -> SkinPlaces:
+        """Return where parallel lines enter the body at rest, nearest to a place on each.
+
+        Args:
+            places: A place on each line [m], shape (n, 3).
+            direction: Unit vector along the lines, into the body, shape (3,).
+        """
+        return _entries(self.at_rest, places, direction, is_ahead=False)
 
     def seen_from(self, eye: FloatArray, direction: FloatArray) -> SkinPlace | None:
         """Return what a ray meets first of the body as it lies; None: nothing.
@@ -61,16 +74,15 @@ class BodySkin(NamedTuple):
             eye: Where the ray begins [m], shape (3,).
             direction: Unit vector along it, shape (3,).
         """
-        faces, ways, weights = _entries(self.lying, eye, direction)
-        ahead = np.flatnonzero(ways > 0.0)
-        if len(ahead) == 0:
-            return None
-        first = int(ahead[np.argmin(ways[ahead])])
-        return SkinPlace(int(faces[first]), weights[first])
+        return _entries(self.lying, eye[None], direction, is_ahead=True).place(0)
 
     def rest_place(self, place: SkinPlace) -> FloatArray:
         """Return where a place of the skin is at rest [m], shape (3,)."""
         return np.asarray(place.weights @ self.at_rest[place.face])
+
+    def rest_places(self, places: SkinPlaces) -> FloatArray:
+        """Return where places of the skin are at rest [m], shape (n, 3)."""
+        return np.asarray(np.einsum("nk,nkx->nx", places.weights, self.at_rest[places.faces]))
 
     def lying_place(self, place: SkinPlace) -> FloatArray:
         """Return where a place of the skin is in the body as it lies [m], shape (3,)."""
@@ -78,29 +90,19 @@ class BodySkin(NamedTuple):
 
 
 def _entries(
-    corners: FloatArray, start: FloatArray, direction: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the faces through which a line enters, the ways there [m], and the weights there.
-
-    After Moeller and Trumbore 1997, J. Graphics Tools 2:21.
+    corners: FloatArray, starts: FloatArray, direction: FloatArray, *, is_ahead: bool
+) -> SkinPlaces:
+    """Return where lines enter a skin, of several places the one nearest to where they start.
 
     Args:
-        corners: Of each face, counter-clockwise seen from outside [m], shape (n, 3, 3).
-        start: Where the ways begin [m], shape (3,).
-        direction: Unit vector along the line, shape (3,).
+        corners: Of each face, counter-clockwise seen from outside [m], shape (n_faces, 3, 3).
+        starts: A place on each line [m], shape (n, 3).
+        direction: Unit vector along the lines, shape (3,).
+        is_ahead: Whether only places ahead of the start count.
     """
-    origin = corners[:, 0]
-    along, across = corners[:, 1] - origin, corners[:, 2] - origin
-    normal = np.cross(along, across)
-    against = -(normal @ direction)
-    is_entry = against > _ALONG * np.linalg.norm(normal, axis=1)
-    faces = np.flatnonzero(is_entry)
-    offset = start - origin[faces]
-    turned = np.cross(offset, direction)
-    facing = against[faces]
-    u = np.einsum("ni,ni->n", across[faces], turned) / facing
-    v = -np.einsum("ni,ni->n", along[faces], turned) / facing
-    inside = (np.minimum(u, v) >= -_ROUNDING) & (u + v <= 1.0 + _ROUNDING)
-    ways = np.einsum("ni,ni->n", offset, normal[faces]) / facing
-    weights = np.column_stack([1.0 - u - v, u, v])
-    return faces[inside], ways[inside], weights[inside]
+    n = len(starts)
+    found = SkinPlaces(np.empty(n, np.int64), np.zeros((n, 3)))
+    given = (np.require(each, np.float64, ["C", "W"]) for each in (corners, starts, direction))
+    in_a_row, begins, way = given
+    write_entries(in_a_row.reshape(-1, 3), begins, way, is_ahead, *found, np.empty(n))
+    return found

@@ -141,6 +141,10 @@ class Elasticity:
                 relaxing_shares=shares.ravel(),
                 relaxation_times=times.ravel(),
                 relaxation_weights=np.zeros(shares.size),
+                # A state that was saved before keeps those of then: how much of them is in use is
+                # counted in the struct, which is another one from now on.
+                around=solid.around.copy(),
+                corner=solid.corner.copy(),
             )
         self.arrays = arrays = arrays.replaced(solid=solid, scaling=no_mass_scaling())
         arrays.highest = arrays.highest_of_tetrahedra = arrays.highest_of_dampers = 0.0

@@ -1,4 +1,4 @@
-"""Surfaces that are given by places on them, in a tree of boxes: which is the nearest to a point.
+"""Places in a tree of boxes: which is the nearest to a point, near a triangle, in a tetrahedron.
 
 The boxes are nodes of a complete binary tree: node 1 is around all places, nodes 2 i and 2 i + 1
 are the halves of node i, and the last row are the leaves. A search goes through the nodes in depth
@@ -15,8 +15,20 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd_rows import natural
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, sub, vec3
-from tissue.geometry.aabb import Aabb, empty_box, overlap, widened, with_point
-from tissue.geometry.tetrahedron import nearest_on_triangle
+from tissue.geometry.aabb import (
+    Aabb,
+    empty_box,
+    overlap,
+    tetrahedron_box,
+    widened,
+    with_point,
+)
+from tissue.geometry.tetrahedron import (
+    barycentric_in,
+    nearest_on_triangle,
+    smallest_weight,
+    tetrahedron_volume,
+)
 
 _IN_A_LEAF = 16
 """Places in a leaf, at most: as many as cost about as much as the two boxes above them."""
@@ -260,3 +272,44 @@ def mark_near_triangles(
                         area += areas[row]
             node = _next_node(node)
     return area
+
+
+@kernel
+def write_holders(
+    tree: PlaceTree, positions: FloatArray, tetrahedra: IntArray, least: float,
+    holders: IntArray, weights: FloatArray,
+) -> None:  # fmt: skip
+    """Write which tetrahedron holds each place, of several the last one.
+
+    Args:
+        tree: The places.
+        positions: Of the nodes [m], shape (n_nodes, 3).
+        tetrahedra: Nodes of each, shape (n_tetrahedra, 4); one without volume holds nothing.
+        least: Barycentric weight that a place has at least in a tetrahedron that holds it.
+        holders: Written where one does, in the order in which the places were given, shape (n,).
+        weights: Written: barycentric weights in it, shape (n, 4).
+    """
+    n_leaves = len(tree.begin) - 1
+    for t in range(len(tetrahedra)):
+        if tetrahedron_volume(positions, tetrahedra, t) == 0.0:
+            continue
+        box, node = tetrahedron_box(positions, tetrahedra, t), 1
+        # Outside the box by as much a weight is lower than that.
+        box = widened(box, 4.0 * abs(least) * norm(sub(box.high, box.low)))
+        while node > 0:
+            if overlap(box, _box(tree, node)):
+                if node < n_leaves:
+                    node *= 2
+                    continue
+                leaf = node - n_leaves
+                for row in range(tree.begin[leaf], tree.begin[leaf + 1]):
+                    p = vec3(tree.places, row)
+                    if not overlap(box, Aabb(p, p)):
+                        continue
+                    found = barycentric_in(p, positions, tetrahedra, t)
+                    if smallest_weight(found) >= least:
+                        number = tree.number[row]
+                        holders[number] = t
+                        weights[number, 0], weights[number, 1] = found.a, found.b
+                        weights[number, 2], weights[number, 3] = found.c, found.d
+            node = _next_node(node)

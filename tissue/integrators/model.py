@@ -32,7 +32,6 @@ from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import ChangedMesh
 from tissue.mesh.cut_face_log import CutFaceLog
-from tissue.mesh.material_table import MaterialArrays
 from tissue.mesh.node_means import write_node_means
 from tissue.mesh.pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 from tissue.mesh.rigid_cores import RigidCores
@@ -145,10 +144,14 @@ class TissueModel:
         self._parts: tuple[Arrays, ...] = ()
         self.find_loose_pieces()
 
-    def take_materials(self, materials: MaterialArrays) -> None:
-        """Make the body of other materials, of which each tetrahedron has a row already."""
-        self.body = self.body.replaced(materials=materials)
-        self.elasticity.take_materials(self.body, self.visits)
+    def materials_changed(self, *, is_elastic: bool) -> None:
+        """Follow the materials of the body, which are other ones.
+
+        `is_elastic`: whether forces inside it, or masses, are.
+        """
+        materials = self.body.materials
+        if is_elastic:
+            self.elasticity.take_materials(self.body, self.visits)
         self.interaction.take_materials(materials)
         self.body.drag[:] = 1.0
         self._write_node_means(np.arange(self.body.n_nodes))

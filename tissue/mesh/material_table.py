@@ -48,6 +48,9 @@ SCALED: dict[str, tuple[str, ...]] = {
 }
 """Quantities that a factor can change, by the names of `Material`, and the columns of each."""
 
+OF_ELASTICITY = frozenset({"young_modulus", "density", "stiffening", "retardation_time"})
+"""Those of them from which forces inside the body, and masses, follow."""
+
 
 class MaterialArrays(Arrays):
     """A row for each material, shape (n_materials,) each."""
@@ -179,6 +182,16 @@ class MaterialArrays(Arrays):
         times = np.array([getattr(self, name) for name in TIMES])
         n_terms = int(shares.any(axis=1).sum())
         return shares[:n_terms], times[:n_terms]
+
+    def is_alike(self, other: "MaterialArrays") -> bool:
+        """Return whether another table has as many rows, of the same labels, and is as even."""
+        cells = all(getattr(self, name) == getattr(other, name) for name in self._cells)
+        return cells and np.array_equal(self.label, other.label)
+
+    def take(self, other: "MaterialArrays") -> None:
+        """Write the numbers of another table, which `is_alike`, in place of these."""
+        for name in self.quantities():
+            getattr(self, name)[:] = getattr(other, name)
 
     def rows(self) -> FloatArray:
         """Return the table as one array, the labels first, shape (n_materials, n_columns)."""

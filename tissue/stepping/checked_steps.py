@@ -116,6 +116,13 @@ class CheckedSteps:
                 f"(`load_state`). Why it stopped: {self._stopped}"
             )
 
+    def release_edge(self, change: Callable[[], Returned]) -> Returned:
+        """Do a change that releases the blade first, which cuts at most where there is one."""
+        if self._stages.model.interaction.is_other_edge(0.0):
+            return self.with_room(change)
+        self.begin_change()
+        return change()
+
     def with_room(self, change: Callable[[], Returned]) -> Returned:
         """Do a change that may cut (`begin_change`); where lists are full, again with more room."""
         self.begin_change()

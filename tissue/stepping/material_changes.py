@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 import numpy.typing as npt
 
 from tissue.blade.edge import NOWHERE
 from tissue.body_materials import chosen, scaled
 from tissue.core.array_types import IntArray
-from tissue.mesh.material_table import MaterialArrays
+from tissue.mesh.material_table import OF_ELASTICITY, MaterialArrays
 from tissue.stepping.given_layers import is_pair, scale_layer
 from tissue.stepping.stages import StepStages
 
@@ -35,27 +36,42 @@ def scale_materials(
         return
     rows = body.material[: body.n_tetrahedra]
     mask = chosen(body.materials, rows, names, where)
-    _change_materials(stages, *scaled(body.materials, rows, mask, factors))
+    table, all_rows = scaled(body.materials, rows, mask, factors)
+    stages.take_edge(None)
+    if table.is_alike(body.materials) and np.array_equal(all_rows, rows):
+        body.materials.take(table)
+    else:
+        _replace_materials(stages, table, all_rows)
+    _follow_materials(stages, is_elastic=not OF_ELASTICITY.isdisjoint(factors))
 
 
-def _change_materials(stages: StepStages, table: MaterialArrays, rows: IntArray) -> None:
-    """Make the body of other materials; the blade lets go of it.
-
-    Nodes keep their places and velocities; masses and moduli are those of the new materials, and
-    the account of energy begins again.
+def _replace_materials(stages: StepStages, table: MaterialArrays, rows: IntArray) -> None:
+    """Give the body another table of materials.
 
     Args:
         stages: The body, and all that follows its materials.
         table: The materials.
         rows: Row of each tetrahedron, shape (n_tets,).
     """
-    stages.take_edge(None)
     model = stages.model
     # A state that was saved before keeps the memory of then: how much of it was in use is counted
     # in the struct of the body, which is another one from now on.
     for owner in stages.owners:
         owner.grow(len(model.body.rest), len(model.body.tetrahedra))
     model.body.material[: model.body.n_tetrahedra] = rows
-    model.take_materials(table)
+    model.body = model.body.replaced(materials=table)
+
+
+def _follow_materials(stages: StepStages, *, is_elastic: bool) -> None:
+    """Make all that follows from the materials of the body; the account of energy begins again.
+
+    Nodes keep their places and velocities; masses and moduli are those of the new materials.
+
+    Args:
+        stages: The body, with its new materials; the blade has let go of it.
+        is_elastic: Whether forces inside the body, or masses, are others.
+    """
+    model = stages.model
+    model.materials_changed(is_elastic=is_elastic)
     stages.integrator.body_moved(model.body)
     stages.audit.begin(stages.context, NOWHERE)

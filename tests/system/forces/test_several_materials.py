@@ -159,3 +159,29 @@ def test_materials_that_do_not_go_together_are_refused():
     ):
         with pytest.raises(ValueError, match=message):
             tissue.set_material(where, **factors)
+
+
+@pytest.mark.parametrize(
+    "factors", [{"young_modulus": 1.3, "density": 0.8}, {"toughness": 0.6, "friction": 1.5}]
+)
+@pytest.mark.parametrize("materials", [SOFT, BOTH], ids=["one material", "two materials"])
+def test_factors_of_an_episode_leave_nothing_to_the_next(materials, factors):
+    """However often: what a cut in a changed body has written is gone with the state."""
+    mesh, where = labelled(2, 0.01), {"fixed": sides(labelled(2, 0.01))}
+    poses = strokes.upright(X, -0.004, 0.02, -0.004, 0.026, SPEED)
+
+    def cut(tissue):
+        strokes.make(tissue, poses)
+        return tissue.snapshot().positions
+
+    fresh, tissue = (Tissue(mesh, materials, **where) for _ in range(2))
+    fresh.set_material(None, **factors)
+    changed, start = cut(fresh), tissue.save_state()
+    as_it_was = cut(tissue)
+    assert not np.array_equal(as_it_was, changed)
+    for _ in range(2):
+        tissue.load_state(start)
+        tissue.set_material(None, **factors)
+        np.testing.assert_array_equal(cut(tissue), changed)
+    tissue.load_state(start)
+    np.testing.assert_array_equal(cut(tissue), as_it_was)
