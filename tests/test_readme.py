@@ -28,6 +28,7 @@ HELPS = (
     "snapshot",
     "trace",
     "film",
+    "dataset",
     "explain",
     "serve",
     "spacemouse",

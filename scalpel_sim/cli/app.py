@@ -11,6 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.cli.check_command import check
 from scalpel_sim.cli.crtk_command import crtk
+from scalpel_sim.cli.dataset_command import dataset
 from scalpel_sim.cli.doctor_command import doctor
 from scalpel_sim.cli.explain_command import explain
 from scalpel_sim.cli.film_command import film
@@ -149,6 +150,7 @@ app.command(film)
 app.command(cut_along_pixels, name="trace")
 app.command(replay)
 app.command(export)
+app.command(dataset)
 app.command(explain)
 app.command(spacemouse)
 app.command(crtk)

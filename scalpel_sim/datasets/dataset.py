@@ -26,6 +26,7 @@ def write_dataset(
     episodes: Sequence[Demonstration],
     writer_in: Callable[[Path], DatasetWriter],
     card: Card,
+    on_episode: Callable[[dict[str, Any]], None] = lambda told: None,
 ) -> Written:
     """Write a dataset to a folder.
 
@@ -36,6 +37,7 @@ def write_dataset(
         episodes: What is written, in order.
         writer_in: Returns what writes to an empty folder.
         card: What its card says.
+        on_episode: Called with what is known of each episode that is whole.
 
     Raises:
         Interrupted: the user or the system ended it.
@@ -55,6 +57,7 @@ def write_dataset(
                     failure = error
                     break
                 told.append(episode.provenance())
+                on_episode(told[-1])
             writer.finish()
         finally:
             writer.close()

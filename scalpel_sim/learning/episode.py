@@ -12,7 +12,9 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.geom_coupling import GeomCouplingError
 from scalpel_sim.instruments.grip import GripError
 from scalpel_sim.instruments.scene_graspers import motions_of
+from scalpel_sim.learning.felt_wrench import FeltWrench
 from scalpel_sim.learning.observations import Observer, Sensor, Shown
+from scalpel_sim.learning.payment import Payment
 from scalpel_sim.learning.policy_hand import PolicyHand
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.scene.act_table import ActTable, hands_led
@@ -95,9 +97,8 @@ class Episode:
         """Control steps of this episode so far."""
         self.fault: str | None = None
         """Error with which the simulation failed; None: it did not."""
-        self.is_success = False
-        """Whether all conditions of success held after the last control step."""
-        self._weights, self._potential = self.task.reward.weights(), 0.0
+        self._felt = FeltWrench(simulation)
+        self._payment = Payment(self.task, self.score)
         self._observation: dict[str, FloatArray] = {}
         self._rest()  # a record begins with a frame at rest
         simulation.note_start()
@@ -108,6 +109,11 @@ class Episode:
         score = self.simulation.score
         assert isinstance(score, Score)
         return score
+
+    @property
+    def is_success(self) -> bool:
+        """Whether all conditions of success held after the last control step."""
+        return self._payment.is_success
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -132,9 +138,9 @@ class Episode:
             rng: All that is random is drawn from it.
         """
         self.simulation.reset()
-        self.n_steps, self.fault, self.is_success = 0, None, False
+        self.n_steps, self.fault = 0, None
         self._observer.begin(Sensor(self._sensor, self.act_table.step, rng))
-        self._potential = self._weighted()
+        self._payment.begin()
         self._observation = self._observer.now()
         return self._observation
 
@@ -158,17 +164,16 @@ class Episode:
         if self.fault is not None:
             raise ValueError("the simulation has failed in this episode: call reset()")
         self.hand.obey(action, self._wrenches())
-        total, peak = np.zeros(6), 0.0
+        self._felt.begin()
         try:
             for _ in range(self.hand.n_frames):
                 simulation.step()
-                total += self._felt()
-                peak = max(peak, self._force())
+                self._felt.add()
         except FAULTS as error:
             self.fault = " ".join(str(error).split())
             return Outcome(0.0, False, True, self.fault, ())
         self.n_steps += 1
-        self._observation = self._observer.after_step(total / self.hand.n_frames, peak)
+        self._observation = self._observer.after_step(self._felt.mean, self._felt.peak)
         return self._judged()
 
     @property
@@ -178,21 +183,11 @@ class Episode:
 
     def _judged(self) -> Outcome:
         """Judge the control step that was done."""
-        failed = self.score.failed() or []
-        now = self._weighted()
-        reward, self._potential = now - self._potential, now
-        self.is_success = self.score.asks and not failed
-        if self.is_success:
-            reward += self.task.reward.success
+        reward, failed = self._payment.after_step(), self.score.failed() or []
         never = tuple(name for name in failed if name in _NEVER_MENDED)
         late = self.max_steps is not None and self.n_steps >= self.max_steps
         ended = self.is_success or bool(never)
         return Outcome(reward, ended, late and not ended, None, never)
-
-    def _weighted(self) -> float:
-        """Return the weighted sum of the terms now."""
-        terms = self.score.terms()
-        return sum(weight * terms.get(name, 0.0) for name, weight in self._weights.items())
 
     def _rest(self) -> None:
         """Do a control step at rest."""
@@ -204,16 +199,3 @@ class Episode:
         simulation = self.simulation
         found = {each.name: each.wrench for each in simulation.graspers}
         return {BLADE_NAME: simulation.blade.wrench, **found}
-
-    def _force(self) -> float:
-        """Return the force on the blade in the last frame [N]: of mean and end the larger."""
-        result = self.simulation.bridge.result
-        if result is None:
-            return 0.0
-        return max(math.hypot(*each.numbers[:3]) for each in (result.wrench, result.wrench_t1))
-
-    def _felt(self) -> FloatArray:
-        """Return the wrench on the blade in the last frame, about its tip, tool frame, (6,)."""
-        numbers = np.array(self.simulation.blade.wrench.numbers[:6]).reshape(2, 3)
-        frame, axes = self.simulation.frame, self.hand.blade.axes
-        return np.concatenate([axes @ (frame.rotation.T @ each) for each in numbers])

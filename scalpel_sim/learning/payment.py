@@ -1,0 +1,40 @@
+"""`Payment`: the rewards of a task, from the terms of its score."""
+
+from scalpel_sim.scene.task_table import TaskTable
+from scalpel_sim.scoring.score import Score
+
+
+class Payment:
+    """Pays for each control step the increase of the weighted terms, and for success.
+
+    Args:
+        task: The task.
+        score: Its score, at the start.
+    """
+
+    def __init__(self, task: TaskTable, score: Score) -> None:
+        self._success, self._score = task.reward.success, score
+        self._weights = task.reward.weights()
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin an episode: nothing is done yet."""
+        self._potential = self._weighted()
+        self.is_success = False
+        """Whether all conditions of success held after the last control step."""
+        self._is_paid = False
+
+    def after_step(self) -> float:
+        """Return the reward of a control step that was done. Success is paid once."""
+        now = self._weighted()
+        reward, self._potential = now - self._potential, now
+        self.is_success = self._score.asks and not self._score.failed()
+        if self.is_success and not self._is_paid:
+            reward += self._success
+            self._is_paid = True
+        return reward
+
+    def _weighted(self) -> float:
+        """Return the weighted sum of the terms now."""
+        terms = self._score.terms()
+        return sum(weight * terms.get(name, 0.0) for name, weight in self._weights.items())
