@@ -156,7 +156,7 @@ def test_every_source_file_that_a_page_names_exists():
 def test_every_page_is_in_the_index():
     index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
     folder = ROOT / "docs"
-    wanted = [*folder.glob("*.md"), *folder.glob("examples/*.py")]
+    wanted = [*folder.glob("*.md"), *folder.glob("examples/**/*.py")]
     names = {path.relative_to(folder).as_posix() for path in wanted} - {"README.md"}
     assert {name for name in names if f"]({name})" not in index} == set()
 

@@ -267,7 +267,7 @@ class _Steps:
         score, task = simulation.score, run.scene.task
         self._payment = None
         if task is not None and isinstance(score, Score):
-            self._payment = Payment(task, score)
+            self._payment = Payment(task, simulation)
 
     def step(self) -> None:
         """Do a frame, which must be what it was."""

@@ -98,7 +98,7 @@ class Episode:
         self.fault: str | None = None
         """Error with which the simulation failed; None: it did not."""
         self._felt = FeltWrench(simulation)
-        self._payment = Payment(self.task, self.score)
+        self._payment = Payment(self.task, simulation)
         self._observation: dict[str, FloatArray] = {}
         self._rest()  # a record begins with a frame at rest
         simulation.note_start()

@@ -1,7 +1,9 @@
 """`Payment`: the rewards of a task, from the terms of its score."""
 
+from scalpel_sim.learning.guide import Guide
 from scalpel_sim.scene.task_table import TaskTable
 from scalpel_sim.scoring.score import Score
+from scalpel_sim.simulation import Simulation
 
 
 class Payment:
@@ -9,16 +11,20 @@ class Payment:
 
     Args:
         task: The task.
-        score: Its score, at the start.
+        simulation: At its start, with its score.
     """
 
-    def __init__(self, task: TaskTable, score: Score) -> None:
-        self._success, self._score = task.reward.success, score
+    def __init__(self, task: TaskTable, simulation: Simulation) -> None:
+        score = simulation.score
+        assert isinstance(score, Score)
+        self._success, self._score, self._simulation = task.reward.success, score, simulation
         self._weights = task.reward.weights()
         self.begin()
 
     def begin(self) -> None:
         """Begin an episode: nothing is done yet."""
+        plan, is_guided = self._score.plan, "approach" in self._weights
+        self._guide = Guide(self._simulation, plan) if plan is not None and is_guided else None
         self._potential = self._weighted()
         self.is_success = False
         """Whether all conditions of success held after the last control step."""
@@ -36,5 +42,8 @@ class Payment:
 
     def _weighted(self) -> float:
         """Return the weighted sum of the terms now."""
-        terms = self._score.terms()
+        simulation, terms = self._simulation, self._score.terms()
+        if self._guide is not None:
+            tip = simulation.frame.segment_to_tissue(simulation.blade.segment).tip
+            terms["approach"] = self._guide.way(tip, self._score.is_covered)
         return sum(weight * terms.get(name, 0.0) for name, weight in self._weights.items())

@@ -122,6 +122,10 @@ class RewardTable(TomlTable, kw_only=True, frozen=True):
     """Weight of the work of the blade [1/J]."""
     time: Finite = 0.0
     """Weight of the time [1/s]."""
+    approach: Finite = 0.0
+    """Weight of the distance from the tip of the blade to the nearest place of the plan that is
+    not cut yet [1/m]: to the bottom of the cut below a line. It guides, and is no term of the
+    score."""
     success: Finite = 0.0
     """Worth of success, once."""
 

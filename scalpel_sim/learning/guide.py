@@ -1,0 +1,52 @@
+"""`Guide`: how far a blade is from what of a plan is still to be cut."""
+
+import numpy as np
+
+from scalpel_sim.recording.observations import farthest_points
+from scalpel_sim.scoring.plan import Plan
+from scalpel_sim.simulation import Simulation
+from tissue import BoolArray, FloatArray, IntArray
+
+MOST_PLACES = 64
+"""Places that stand for a plan without a line."""
+
+
+class Guide:
+    """Finds the way of a blade to what of a plan is still to be cut.
+
+    A plan with a line is represented by the bottom of the cut below each station of it, so that
+    the way leads into the depth; another one by places spread over it.
+
+    Args:
+        simulation: At its start.
+        plan: The plan.
+    """
+
+    def __init__(self, simulation: Simulation, plan: Plan) -> None:
+        points = plan.surface.points
+        if len(plan.stations):
+            wanted = plan.stations + np.outer(plan.depths, plan.into)
+        else:
+            wanted = farthest_points(points, min(MOST_PLACES, len(points)))
+        self._places = _nearest(points, wanted)
+        self._link, self._rest = simulation.link, points[self._places]
+        self._holders: IntArray = np.full(len(self._places), -1)
+
+    def way(self, tip: FloatArray, is_covered: BoolArray) -> float:
+        """Return the distance from the tip to the nearest place that is not cut [m]; 0: all are.
+
+        Args:
+            tip: The tip [m], tissue frame.
+            is_covered: Which places of the plan are cut.
+        """
+        at = self._link.positions_of(self._rest, self._holders)
+        is_left = ~is_covered[self._places]
+        if not is_left.any():
+            return 0.0
+        return float(np.linalg.norm(at[is_left] - tip, axis=1).min())
+
+
+def _nearest(points: FloatArray, wanted: FloatArray) -> IntArray:
+    """Return the points that are nearest to some places, each once."""
+    found = [int(((points - place) ** 2).sum(axis=1).argmin()) for place in wanted]
+    return np.unique(found)
