@@ -86,6 +86,15 @@ class LiveInstrument(abc.ABC):
         jaws.
         """
 
+    def put(self, by: FloatArray) -> None:
+        """Put it elsewhere at once, as far as its workspace goes: by a displacement [m].
+
+        Args:
+            by: Tissue frame, shape (3,).
+        """
+        self.pose.put(by)
+        self._take_edge(self._edge_at(self.pose.middle, self.axes))
+
     def aim(self, to: FloatArray) -> None:
         """Want what is led to be at a place [m], world frame."""
         lever = np.array(self.numbers[:3]) - self.pose.middle

@@ -107,6 +107,12 @@ class LimitedPose:
         self.wanted_rotation[:] = rotation
         self._is_limited |= math.dist(middle.tolist(), self.wanted.tolist()) > ARRIVED
 
+    def put(self, by: FloatArray) -> None:
+        """Put it elsewhere at once, by a displacement [m], as far as its workspace goes."""
+        self.middle[:] = np.clip(self.middle + by, *self.workspace)
+        self.wanted[:] = self.middle
+        self._way.clear()
+
     def rest(self) -> None:
         """Want it to be where it is."""
         self._way.clear()

@@ -114,15 +114,17 @@ class TissueEnv(gymnasium.Env[Any, Any]):
 
         Args:
             seed: Seed of all that is random; None: as before.
-            options: None are known.
+            options: {"variation": numbers of `[[vary]]` by name}, as `info["variation"]` has
+                had them, in place of those that are drawn.
 
         Raises:
-            UsageError: there is no such option.
+            UsageError: there is no such option, or a number is missing, unknown or out of range.
         """
         super().reset(seed=seed)
-        if options:
-            raise UsageError(f"reset has no option '{next(iter(options))}'")
-        self.episode.reset(self.np_random)
+        for name in options or {}:
+            if name != "variation":
+                raise UsageError(f"reset has no option '{name}'; it has variation")
+        self.episode.reset(self.np_random, (options or {}).get("variation"))
         if self.render_mode == HUMAN:
             self._live_page()
         return self._observed(), self._info(None)
@@ -155,7 +157,9 @@ class TissueEnv(gymnasium.Env[Any, Any]):
             "is_success": episode.is_success,
             "score": episode.score.terms(),
         }
-        if outcome is not None and outcome.failed:
+        if outcome is None:
+            info["variation"] = dict(episode.drawn)
+        elif outcome.failed:
             info["failed"] = list(outcome.failed)
         if outcome is not None and outcome.fault is not None:
             info["fault"] = outcome.fault

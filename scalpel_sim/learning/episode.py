@@ -1,6 +1,7 @@
 """`Episode`: a task that a policy does, control step by control step. It needs no Gymnasium."""
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +17,14 @@ from scalpel_sim.learning.felt_wrench import FeltWrench
 from scalpel_sim.learning.observations import Observer, Sensor, Shown
 from scalpel_sim.learning.payment import Payment
 from scalpel_sim.learning.policy_hand import PolicyHand
+from scalpel_sim.learning.variation import Variation
 from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.scene.act_table import ActTable, hands_led
 from scalpel_sim.scene.arm_tables import BLADE_NAME
 from scalpel_sim.scene.observe_table import ObserveTable, quantities_shown
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scoring.score import Score
+from scalpel_sim.strokes.kind import StrokeTable
 from tissue import FloatArray, TissueError, Wrench
 
 KINEMATIC, FULL = "kinematic", "full"
@@ -102,6 +105,14 @@ class Episode:
         self._observation: dict[str, FloatArray] = {}
         self._rest()  # a record begins with a frame at rest
         simulation.note_start()
+        self._variation = Variation(simulation, scene)
+        self.drawn: dict[str, float] = {}
+        """Numbers of `[[vary]]` in this episode, by name."""
+
+    @property
+    def strokes(self) -> tuple[StrokeTable, ...]:
+        """Strokes of the scene; in this episode traced ones lie where the line of the task does."""
+        return self._variation.strokes(self.drawn)
 
     @property
     def score(self) -> Score:
@@ -131,15 +142,28 @@ class Episode:
         seconds = self.task.seconds
         return None if seconds is None else math.ceil(seconds / self.act_table.step)
 
-    def reset(self, rng: np.random.Generator) -> dict[str, FloatArray]:
+    def reset(
+        self, rng: np.random.Generator, variation: Mapping[str, float] | None = None
+    ) -> dict[str, FloatArray]:
         """Begin an episode; return the first observation.
 
         Args:
             rng: All that is random is drawn from it.
+            variation: Numbers of `[[vary]]` by name, all of them, as `drawn` has had them; None:
+                they are drawn.
+
+        Raises:
+            UsageError: a number is missing, unknown or out of its range.
         """
+        given = None if variation is None else self._variation.checked(variation)
         self.simulation.reset()
+        drawn = self._variation.draw(rng)  # in any case: then noise is the same
+        self.drawn = drawn if given is None else given
+        self._variation.apply(self.drawn)
+        self._start_elsewhere()
         self.n_steps, self.fault = 0, None
-        self._observer.begin(Sensor(self._sensor, self.act_table.step, rng))
+        sensor = self._variation.sensor(self._sensor, self.drawn)
+        self._observer.begin(Sensor(sensor, self.act_table.step, rng))
         self._payment.begin()
         self._observation = self._observer.now()
         return self._observation
@@ -188,6 +212,16 @@ class Episode:
         late = self.max_steps is not None and self.n_steps >= self.max_steps
         ended = self.is_success or bool(never)
         return Outcome(reward, ended, late and not ended, None, never)
+
+    def _start_elsewhere(self) -> None:
+        """Put hands where they start in this episode; ways count from there."""
+        starts = self._variation.starts(self.drawn)
+        if not starts:
+            return
+        for _ in range(self.hand.start_elsewhere(starts, at_once=self.arm == KINEMATIC)):
+            self._rest()
+        for each in self.score.hands:
+            each.begin_way()
 
     def _rest(self) -> None:
         """Do a control step at rest."""

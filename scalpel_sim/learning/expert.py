@@ -72,7 +72,7 @@ class Expert:
         body = link.snapshot()
         mesh = TetrahedralMesh(body.positions, body.tetrahedra)
         stroke = stroke_through(
-            mesh, scene.strokes, link.describe().material, scene.world.stop, body.rest_positions
+            mesh, episode.strokes, link.describe().material, scene.world.stop, body.rest_positions
         )
         self._scripts: dict[str, _Script] = {}
         self._progress: StrokeProgress | None = None

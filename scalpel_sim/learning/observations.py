@@ -130,7 +130,8 @@ def stations_of(plan: Plan) -> FloatArray:
 def _nearest(points: FloatArray, stations: FloatArray, into: FloatArray) -> IntArray:
     """Return the nearest station of each place, as seen along the depth, shape (n,)."""
     seen = [each - np.outer(each @ into, into) for each in (points, stations)]
-    squares = ((seen[0][:, None] - seen[1]) ** 2).sum(axis=2)
+    # |p - s|^2 without |p|^2, which is the same for all stations.
+    squares = (seen[1] ** 2).sum(axis=1) - 2.0 * np.einsum("pk,sk->ps", *seen)
     return np.asarray(squares.argmin(axis=1))
 
 

@@ -1,12 +1,12 @@
 """A hand that a policy leads: what an action says is done evenly over a control step."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from scalpel_sim.hands.driven_instruments import LiveInstrument
-from scalpel_sim.hands.limited_pose import LimitedPose
+from scalpel_sim.hands.limited_pose import MOST_SPEED, LimitedPose
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.instruments.driven_grasper import MotionFollower
 from scalpel_sim.scene.act_table import ActTable
@@ -100,6 +100,27 @@ class PolicyHand(Teleoperation):
             motion = self._scripted.get(grasper.name)
             if motion is not None:
                 grasper.controller = MotionFollower(grasper.grasper, motion, simulation.frame)
+
+    def start_elsewhere(self, starts: Mapping[str, FloatArray], *, at_once: bool) -> int:
+        """Lead instruments elsewhere before an episode; return the control steps that it takes.
+
+        Args:
+            starts: By how much, by name [m], tissue frame, shape (3,) each.
+            at_once: Whether they are there in the next control step: those that nothing carries.
+        """
+        n = 1
+        for name, by in starts.items():
+            instrument = self._instruments[name]
+            if at_once:
+                instrument.put(by)
+                continue
+            pose, way = instrument.pose, float(np.linalg.norm(by))
+            assert isinstance(pose, EvenPose)
+            of_this = 1 + math.ceil(way / (min(self._act.speed, MOST_SPEED) * self._act.step))
+            pose.n_frames = of_this * self._n_frames
+            pose.move(by)
+            n = max(n, of_this)
+        return n
 
     def obey(self, action: FloatArray, wrenches: dict[str, Wrench]) -> None:
         """Do an action over the next control step.

@@ -10,7 +10,7 @@ from msgspec import field, structs, to_builtins
 
 from bridge import VirtualCoupling
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene.act_table import ActTable, check_act
+from scalpel_sim.scene.act_table import ActTable, check_act, hands_led
 from scalpel_sim.scene.arm_tables import ArmTable, GrasperTable
 from scalpel_sim.scene.blade import blade_of, table_of_blade
 from scalpel_sim.scene.body import (
@@ -140,7 +140,8 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_task(self.task, names)
         check_act(self.act, names)
         check_observe(self.observe, names, self._cameras, has_task=self.task is not None)
-        check_vary(self.vary, names, [row.between for row in self.interfaces], self.task)
+        hands = hands_led(self.act or ActTable(), names)
+        check_vary(self.vary, hands, [row.between for row in self.interfaces], self.task)
 
     @property
     def bodies(self) -> tuple[OneOfBodiesTable, ...]:

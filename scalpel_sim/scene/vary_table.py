@@ -111,7 +111,7 @@ class VaryTable(TomlTable, kw_only=True, frozen=True):
 
 def check_vary(
     rows: Sequence[VaryTable],
-    graspers: Sequence[str],
+    hands: Sequence[str],
     layers: Sequence[tuple[str, str]],
     task: TaskTable | None,
 ) -> None:
@@ -119,7 +119,7 @@ def check_vary(
 
     Args:
         rows: The rows.
-        graspers: Names of the graspers.
+        hands: Names of the hands that a policy leads.
         layers: Names of the two parts between which each layer is.
         task: The task; None: there is none.
 
@@ -129,7 +129,7 @@ def check_vary(
     for i, row in enumerate(rows):
         where = f"[[vary]] number {i + 1}, of {row.what},"
         _check_range(row, where)
-        _check_owner(row, where, graspers, layers)
+        _check_owner(row, where, hands, layers)
         if row.what in OF_LINE and (task is None or task.line is None):
             raise UsageError(f"{where} moves the line of a task: add `line` to [task]")
         if any(row.name == other.name for other in rows[:i]):
@@ -163,7 +163,7 @@ def _bounds(what: str) -> tuple[float, float, str]:
 
 
 def _check_owner(
-    row: VaryTable, where: str, graspers: Sequence[str], layers: Sequence[tuple[str, str]]
+    row: VaryTable, where: str, hands: Sequence[str], layers: Sequence[tuple[str, str]]
 ) -> None:
     """Refuse a part, a layer or a hand that is not there, or that another quantity has."""
     given = {"label": row.label, "between": row.between, "hand": row.hand}
@@ -179,6 +179,7 @@ def _check_owner(
             known = "; ".join(" and ".join(pair) for pair in pairs) or "none"
             asked = " and ".join(row.between)
             raise UsageError(f"{where} is of no [[interface]]: {asked}. Those that are: {known}")
-    hands = (BLADE_NAME, *graspers)
-    if row.hand is not None and row.hand not in hands:
-        raise UsageError(f"{where} hand: {unknown('hand', row.hand, hands)}")
+    if row.what in OF_START and (row.hand or BLADE_NAME) not in hands:
+        raise UsageError(
+            f"{where} hand: {unknown('hand of a policy', row.hand or BLADE_NAME, hands)}"
+        )

@@ -35,6 +35,11 @@ class HandTerms:
         self._last: tuple[tuple[float, ...], ...] = ()
         self._held_last = False
 
+    def begin_way(self) -> None:
+        """Begin its way anew: it was put elsewhere."""
+        self.path_length, self._squares = 0.0, 0.0
+        self._last, self._n_steps, self._n_held = (), 0, 0
+
     def feel(self, wrench: Wrench, dt: float) -> None:
         """Count the wrench on it in a frame of `dt` [s]."""
         x, y, z = wrench.numbers[:3]

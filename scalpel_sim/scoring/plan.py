@@ -140,8 +140,7 @@ def plan_of_line(task: TaskTable, body: Snapshot, skin: BodySkin) -> Plan:
     """
     assert task.line is not None and task.depth is not None
     into = depth_direction(task)
-    high = float(body.rest_positions[:, 2].max())
-    corners = np.array([(*point, high) if len(point) == 2 else point for point in task.line])
+    corners = corners_of_line(task, body)
     middles, ways = [], []
     for start, end in itertools.pairwise(corners):
         way = end - start - float((end - start) @ into) * into
@@ -157,6 +156,13 @@ def plan_of_line(task: TaskTable, body: Snapshot, skin: BodySkin) -> Plan:
     normals = np.repeat(np.cross(steps, into) / widths[:, None], n_deep, axis=0)
     areas = np.repeat(widths * task.depth / n_deep, n_deep)
     return _plan(SampledSurface(places, normals, areas), line, into, body)
+
+
+def corners_of_line(task: TaskTable, body: Snapshot) -> FloatArray:
+    """Return the points of the line of a task, some of them above the body [m], shape (n, 3)."""
+    assert task.line is not None
+    high = float(body.rest_positions[:, 2].max())
+    return np.array([(*point, high) if len(point) == 2 else point for point in task.line])
 
 
 def depth_direction(task: TaskTable) -> FloatArray:

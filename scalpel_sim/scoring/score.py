@@ -61,6 +61,15 @@ class Score:
         self._look_at_target(simulation)
 
     @property
+    def yardstick(self) -> Yardstick:
+        """The plan and the limits."""
+        return self._yardstick
+
+    def compare_with(self, yardstick: Yardstick) -> None:
+        """Compare cuts with another plan from now on; before the first cut."""
+        self._yardstick, self.cut = yardstick, CutTerms(yardstick)
+
+    @property
     def plan(self) -> Plan | None:
         """The plan; None where there is none."""
         return self._yardstick.plan

@@ -5,7 +5,6 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tissue import FloatArray, IntArray, TetrahedralMesh, boundary_faces
-from tissue.support import write_entries
 
 
 class SkinPlace(NamedTuple):
@@ -100,6 +99,8 @@ def _entries(
         direction: Unit vector along the lines, shape (3,).
         is_ahead: Whether only places ahead of the start count.
     """
+    from tissue.support import write_entries  # a kernel: a scene is read without the compiler
+
     n = len(starts)
     found = SkinPlaces(np.empty(n, np.int64), np.zeros((n, 3)))
     given = (np.require(each, np.float64, ["C", "W"]) for each in (corners, starts, direction))

@@ -117,8 +117,8 @@ class CheckedSteps:
             )
 
     def release_edge(self, change: Callable[[], Returned]) -> Returned:
-        """Do a change that releases the blade first, which cuts at most where there is one."""
-        if self._stages.model.interaction.is_other_edge(0.0):
+        """Do a change that releases the blade first: that cuts at most what it has left uncut."""
+        if self._stages.incision.has_begun:
             return self.with_room(change)
         self.begin_change()
         return change()

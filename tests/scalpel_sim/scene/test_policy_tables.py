@@ -168,7 +168,7 @@ def test_a_plan_is_shown_where_there_is_one():
             'between = ["vessel", "skin"]\nrange',
             "is of no [[interface]]: vessel and skin. Those that are: fat and vessel",
         ),
-        ('hand = "left"', 'hand = "right"', "hand: no hand is called 'right'"),
+        ('hand = "left"', 'hand = "right"', "hand: no hand of a policy is called 'right'"),
         ('"sensor.force"\n', '"task.line.turn"\n', "is the second one of task.line.turn"),
     ],
 )
