@@ -163,12 +163,12 @@ class ChainKinematics:
 
     def solve(self, qpos: FloatArray, pose: BladeSegment) -> tuple[FloatArray, Miss]:
         """Return a configuration near `qpos` that has the edge at a pose, and what it lacks."""
-        target = np.eye(4)
-        target[:3, :3], target[:3, 3] = _wanted(pose)
+        wanted, target = _wanted(pose), np.eye(4)
+        target[:3, :3], target[:3, 3] = wanted
         self._task.set_target(self._mink.SE3.from_matrix(target))
         for i in range(_ITERATIONS):
             self._configuration.update(qpos)
-            miss = self._miss(pose)
+            miss = self._miss(*wanted)
             if miss.size < 0.1 or i == _ITERATIONS - 1:
                 break
             try:
@@ -188,7 +188,7 @@ class ChainKinematics:
             What it lacks, and the Jacobian of the edge as `Miss.weighed`, of shape (6, n_joints).
         """
         position, rotation = self._place(qpos)
-        return self._miss(pose), np.vstack([position, _LEVER * rotation])
+        return self._miss(*_wanted(pose)), np.vstack([position, _LEVER * rotation])
 
     def within_ranges(self, qpos: FloatArray) -> FloatArray:
         """Return the configuration nearest to `qpos` that the joints can take."""
@@ -214,9 +214,8 @@ class ChainKinematics:
         mujoco.mj_jacSite(self._model, self._data, position, rotation, self._site)
         return position, rotation
 
-    def _miss(self, pose: BladeSegment) -> Miss:
-        """Return what the edge lacks to a pose, from where the joints are."""
-        axes, middle = _wanted(pose)
+    def _miss(self, axes: FloatArray, middle: FloatArray) -> Miss:
+        """Return what the edge lacks to what is `_wanted`, from where the joints are."""
         now = self._data.site_xmat[self._site].reshape(3, 3)
         return Miss(middle - self._data.site_xpos[self._site], _turn(now, axes))
 

@@ -7,6 +7,7 @@ from bridge import FixtureBox
 from scalpel_sim import prepare
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.read import scene_in, shipped_scene, with_settings
+from tests.scalpel_sim.coarse_lobe import with_coarse_lobe
 from tissue import pieces_of
 
 HELD = 5e-4
@@ -75,8 +76,9 @@ def test_the_same_stroke_takes_the_same_force_as_by_another_arm(cut):
     assert mean_force(cut[0]) == pytest.approx(mean_force(other), rel=SAME_FORCE)
 
 
-def test_two_of_them_cut_off_the_edge_that_one_lifts_each_through_its_own_trocar():
-    scene = scene_with("retract", 'arm.preset="psm"', 'solver.relaxation="verlet"')
+def test_two_of_them_cut_off_the_edge_that_one_lifts_each_through_its_own_trocar(tmp_path):
+    settings = ('arm.preset="psm"', 'solver.relaxation="verlet"')
+    scene = with_coarse_lobe("retract", tmp_path, *settings)
     simulation, watches = run(scene, "", "left_")
     held, off = pieces_of(simulation.link.snapshot())
     assert held.is_held and not off.is_held and off.centre[2] > 0.03

@@ -12,7 +12,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.figures import figures
 from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
 from scalpel_sim.figures.mesh_drawing import cell_edges
-from scalpel_sim.scene.scene import changed
+from tests.scalpel_sim.coarse_lobe import with_coarse_lobe
 
 
 @pytest.fixture
@@ -101,15 +101,15 @@ def test_the_picture_of_the_readme_shows_the_organ_as_it_is_cut(wider, capsys):
 
 
 def test_the_picture_shows_what_the_left_hand_lifts_before_and_after_it_is_cut_off(
-    wider, monkeypatch, capsys
+    wider, tmp_path, monkeypatch, capsys
 ):
-    fast = changed(SCENES["retract"], relaxation="verlet")
+    fast = with_coarse_lobe("retract", tmp_path, 'solver.relaxation="verlet"')
     monkeypatch.setitem(SCENES, "retract", fast)
     assert command_line(["figure", "retract", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["file"] == "figureretract.png"
     before, after = printed["n_tetrahedra"]
-    assert 5136 <= before < after
+    assert before < after
     image = matplotlib.image.imread(printed["file"])
     assert image.shape[:2] == (195, 2 * 240 + figures.GAP)
     # Both instruments are of grey steel, and the handle of the scalpel is blue.

@@ -1,5 +1,7 @@
 """Whole cuts: a blade without an arm passes through a body and leaves a sound mesh."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -71,8 +73,10 @@ EXTENT = 0.2
 
 
 @pytest.mark.skipif(not bodies.FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
-@pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
-@pytest.mark.parametrize("file", bodies.FILES)
+@pytest.mark.parametrize(
+    ("file", "stroke"),
+    [*itertools.product(bodies.FILES, ["straight", "curved"]), ("sofa_liver.msh", "slanted")],
+)
 def test_a_third_party_mesh_falls_into_two_sound_pieces(file, stroke):
     raw = bodies.third_party_mesh(file)
     longest = np.ptp(raw.positions, axis=0).max()
