@@ -14,6 +14,7 @@ from cyclopts import Group, Parameter
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.options import Flag
+from scalpel_sim.scene.read import TASK_SCENES
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.schema import BladeTable, MaterialTable, SolverTable
 from scalpel_sim.strokes.kinds import STROKES
@@ -25,8 +26,8 @@ SceneName = Annotated[
     Parameter(
         help="organ (default), incision, retract, excise, taut_incision, layers, tumour, "
         "gallbladder, a specimen of a material (liver, kidney, skin, fat, muscle, gelatin, "
-        "silicone), slab, grid2 or grid7; a task (incise-v0); or a FILE.toml, which the command "
-        "`new` writes."
+        f"silicone), slab, grid2 or grid7; a task ({', '.join(TASK_SCENES)}); or a FILE.toml, "
+        "which the command `new` writes."
     ),
 ]
 

@@ -1,10 +1,10 @@
-"""A gallbladder on its bed of liver: implicit shapes, and the mesh that comes with the package.
+"""A gallbladder on its bed of liver: implicit shapes, and the meshes that come with the package.
 
-`python -m scalpel_sim.meshing.gallbladder` makes the mesh again and writes `GALLBLADDER_FILE`.
+`python -m scalpel_sim.meshing.gallbladder` makes the meshes again and writes their files.
 
 It stands: x goes from the neck to the fundus, y from the gallbladder into the liver, z upwards.
 The gallbladder is solid, in the place of a wall round bile. The artery is twice as thick as a real
-one, which is 2 to 3 mm: a tetrahedron is 4 mm wide.
+one, which is 2 to 3 mm: a tetrahedron is 4 mm wide, and 7 mm in the coarse mesh.
 """
 
 from pathlib import Path
@@ -17,11 +17,17 @@ from tissue import FloatArray, IntArray, TetrahedralMesh
 GALLBLADDER_FILE = Path(__file__).with_name("gallbladder.npz")
 """The mesh that comes with the package."""
 
+COARSE_FILE = Path(__file__).with_name("gallbladder_coarse.npz")
+"""A coarse one, for policies that learn: a fifth of the tetrahedra."""
+
 PART_NAMES = {1: "liver", 2: "fat", 3: "gallbladder", 4: "artery"}
 """Names of the labels."""
 
 LATTICE_SPACING = 0.0047
 """Edge of a lattice cell [m]: gives some 4,800 tetrahedra."""
+
+COARSE_SPACING = 0.0084
+"""The same of the coarse mesh [m]: gives some 1,100."""
 
 MENDED_QUALITY = 0.5
 """Quality to which tetrahedra are mended: small ones where three labels meet would make the time
@@ -90,27 +96,31 @@ def _pad(x: FloatArray, height: FloatArray, z: FloatArray) -> FloatArray:
     return depth
 
 
-def made_gallbladder() -> TetrahedralMesh:
-    """Return the mesh, its lowest corner at the origin."""
+def made_gallbladder(spacing: float = LATTICE_SPACING) -> TetrahedralMesh:
+    """Return the mesh, its lowest corner at the origin.
+
+    Args:
+        spacing: Edge of a lattice cell [m].
+    """
     from tissue.support import stuff_labels
 
     # The back and the middle lie in planes of the lattice.
-    low = [
-        -5.0 * LATTICE_SPACING,
-        LIVER_BACK - 7.0 * LATTICE_SPACING,
-        MIDDLE_HEIGHT - 6.0 * LATTICE_SPACING,
-    ]
-    high = [0.095, LIVER_BACK + 3.0 * LATTICE_SPACING, MIDDLE_HEIGHT + 6.0 * LATTICE_SPACING]
-    made = stuff_labels(depth_in_part, len(PART_NAMES), [low, high], LATTICE_SPACING)
+    low = [-5.0 * spacing, LIVER_BACK - 7.0 * spacing, MIDDLE_HEIGHT - 6.0 * spacing]
+    high = [0.095, LIVER_BACK + 3.0 * spacing, MIDDLE_HEIGHT + 6.0 * spacing]
+    made = stuff_labels(depth_in_part, len(PART_NAMES), [low, high], spacing)
     mesh = mended(made, MENDED_QUALITY, MENDED_STEP).mesh
     return mesh._replace(
         positions=mesh.positions - mesh.positions.min(axis=0), label_names=dict(PART_NAMES)
     )
 
 
-def gallbladder() -> TetrahedralMesh:
-    """Return the mesh in `GALLBLADDER_FILE`, which `made_gallbladder` made: 73 x 23 x 40 mm."""
-    with np.load(GALLBLADDER_FILE, allow_pickle=False) as file:
+def gallbladder(*, coarse: bool = False) -> TetrahedralMesh:
+    """Return a mesh that `made_gallbladder` made: 73 x 23 x 40 mm.
+
+    Args:
+        coarse: Whether it is the one in `COARSE_FILE`; else that in `GALLBLADDER_FILE`.
+    """
+    with np.load(COARSE_FILE if coarse else GALLBLADDER_FILE, allow_pickle=False) as file:
         return TetrahedralMesh(
             file["positions"],
             file["tetrahedra"].astype(np.int64),
@@ -119,15 +129,14 @@ def gallbladder() -> TetrahedralMesh:
         )
 
 
-def _save(mesh: TetrahedralMesh) -> None:
-    """Write `GALLBLADDER_FILE`."""
+def _save(mesh: TetrahedralMesh, path: Path) -> None:
+    """Write the file of a mesh."""
     tetrahedra = mesh.tetrahedra.astype(np.int32)
     assert mesh.labels is not None
     labels = mesh.labels.astype(np.int8)
-    np.savez_compressed(
-        GALLBLADDER_FILE, positions=mesh.positions, tetrahedra=tetrahedra, labels=labels
-    )
+    np.savez_compressed(path, positions=mesh.positions, tetrahedra=tetrahedra, labels=labels)
 
 
 if __name__ == "__main__":
-    _save(made_gallbladder())
+    _save(made_gallbladder(), GALLBLADDER_FILE)
+    _save(made_gallbladder(COARSE_SPACING), COARSE_FILE)

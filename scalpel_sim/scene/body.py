@@ -45,7 +45,7 @@ _RINGS = 5
 
 KEYS_OF_SHAPE = {
     "organ": Kind(),
-    "gallbladder": Kind(),
+    "gallbladder": Kind(possible=("coarse",)),
     "block": Kind(needed=("size", "cells")),
     "lattice": Kind(needed=("size", "cells")),
     "graded": Kind(needed=("along_x", "along_y", "along_z")),
@@ -83,6 +83,8 @@ class BodyTable(TomlTable, kw_only=True, frozen=True, dict=True):
     """Rings of elements of a cylinder, from its axis to its side; 5 without."""
     layers: Whole | None = None
     """Layers of elements of a cylinder; without, as thick as the rings."""
+    coarse: TrueOrFalse | None = None
+    """Whether a gallbladder has the coarse mesh of 1,074 tetrahedra: for policies that learn."""
     file: FileName | None = None
     """File of a mesh: Gmsh, VTK, Medit, TetGen, Abaqus or Nastran."""
     scale: Positive | None = None
@@ -236,7 +238,7 @@ def _mesh_of(body: BodyTable) -> TetrahedralMesh:
         case "organ":
             return tissue.liver_lobe()
         case "gallbladder":
-            return gallbladder()
+            return gallbladder(coarse=bool(body.coarse))
         case "graded" | "lobe":
             assert body.along_x is not None
             assert body.along_y is not None and body.along_z is not None

@@ -49,7 +49,14 @@ SHIPPED_SCENES = (
 )
 """Names of the scenes that come with the project."""
 
-TASK_SCENES = ("incise-v0",)
+TASK_SCENES = (
+    "biopsy-v0",
+    "dissect-v0",
+    "excise-v0",
+    "gallbladder-v0",
+    "incise-v0",
+    "retract-v0",
+)
 """Names of the tasks that come with it. One never changes what it means: changed, it has another
 version."""
 

@@ -8,6 +8,7 @@ import pytest
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import EXIT_OK
 from scalpel_sim.meshing.gallbladder import (
+    COARSE_SPACING,
     LATTICE_SPACING,
     LIVER_BACK,
     MENDED_QUALITY,
@@ -30,6 +31,13 @@ def tetrahedra_of(name):
     return MESH.tetrahedra[NUMBERS[name] == MESH.labels]
 
 
+def n_parts(tetrahedra):
+    """Return the number of pieces of some tetrahedra."""
+    _, tets = np.unique(tetrahedra, return_inverse=True)
+    edges = tets.reshape(-1, 4)[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
+    return components(tets.max() + 1, edges)[0]
+
+
 def bed():
     """Triangles between liver and gallbladder."""
     liver, sac = (np.sort(boundary_faces(tetrahedra_of(n))) for n in ("liver", "gallbladder"))
@@ -44,14 +52,22 @@ def test_the_shipped_mesh_is_the_one_that_the_code_makes():
     np.testing.assert_allclose(made.positions, MESH.positions, rtol=0.0, atol=1e-12)
 
 
+def test_the_coarse_mesh_is_the_one_that_the_code_makes_with_the_same_parts_each_in_one_piece():
+    made, mesh = made_gallbladder(COARSE_SPACING), gallbladder(coarse=True)
+    np.testing.assert_array_equal(made.tetrahedra, mesh.tetrahedra)
+    np.testing.assert_allclose(made.positions, mesh.positions, rtol=0.0, atol=1e-12)
+    assert checked(mesh).warnings == ()
+    assert len(mesh.tetrahedra) < 0.25 * len(MESH.tetrahedra)
+    for label in PART_NAMES:
+        assert n_parts(mesh.tetrahedra[mesh.labels == label]) == 1
+
+
 def test_it_is_one_sound_body_of_four_parts_each_in_one_piece():
     assert checked(MESH).warnings == ()
     assert 3_000 <= len(MESH.tetrahedra) <= 6_000
     assert quality(MESH.positions, MESH.tetrahedra).min() >= 0.99 * MENDED_QUALITY
     for name in NUMBERS:
-        _, tets = np.unique(tetrahedra_of(name), return_inverse=True)
-        edges = tets.reshape(-1, 4)[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
-        assert components(tets.max() + 1, edges)[0] == 1, name
+        assert n_parts(tetrahedra_of(name)) == 1, name
 
 
 def test_gallbladder_and_liver_share_the_bed_and_the_artery_is_in_fat_beside_the_neck():

@@ -33,11 +33,17 @@ def test_the_help_names_every_task(capsys):
     assert all(name in help_of_run for name in TASK_SCENES)
 
 
+def has_ended(simulation):
+    """Return whether its strokes have ended, where they end otherwise than by the clock."""
+    progress = simulation.blade.progress
+    return progress is not None and progress.mode == ENDED
+
+
 @pytest.mark.parametrize("name", TASK_SCENES)
 def test_what_the_script_of_a_task_does_solves_it(name):
     simulation = prepare(scene_called(name), records=False)
     assert simulation.score.failed(), "it is not solved as it begins"
-    simulation.run(simulation.duration, lambda now: now.blade.progress.mode == ENDED)
+    simulation.run(simulation.duration, has_ended)
     simulation.run(simulation.time + REST)
     assert simulation.score.failed() == []
 
