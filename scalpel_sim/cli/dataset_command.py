@@ -7,21 +7,22 @@ from collections.abc import Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
-
-from scalpel_sim.cli.camera_options import CAMERA
+from scalpel_sim.cli.dataset_options import DatasetFiles, ExpertOptions, TakenOptions
 from scalpel_sim.errors import UsageError
 from scalpel_sim.runs.console import log_to_stderr, progress, say
-from scalpel_sim.runs.options import OUTPUT, Flag, PrintOptions
+from scalpel_sim.runs.options import PrintOptions
 from scalpel_sim.runs.stop_signals import StopSignals
+from scalpel_sim.tables.text_files import is_toml_file
 
 if TYPE_CHECKING:  # `--help` should not wait for a compiler
     from scalpel_sim.datasets.card import Card
     from scalpel_sim.datasets.dataset import Written
     from scalpel_sim.datasets.demonstration import DatasetLayout, DatasetWriter
+    from scalpel_sim.datasets.taking import DatasetRequest, TakenDemonstration
     from scalpel_sim.scene.observe_table import CameraTable
+    from scalpel_sim.scene.scene import Scene
 
 _FORMS = {"lerobot": "LeRobot v3.0", "robomimic": "robomimic HDF5"}
 """Names of the formats, by what chooses them."""
@@ -31,21 +32,13 @@ _SIZED = re.compile(r"(.+):(\d+)x(\d+)")
 
 
 def dataset(
-    *runs: Path,
-    output: Annotated[Path, Parameter(name=["--output", "-o"], group=OUTPUT)],
-    form: Annotated[
-        Literal["lerobot", "robomimic"], Parameter(name="--format", group=OUTPUT)
-    ] = "lerobot",
-    cameras: Annotated[
-        tuple[str, ...] | None, Parameter(consume_multiple=True, negative="", group=CAMERA)
-    ] = None,
-    fps: Annotated[int | None, Parameter(group=CAMERA)] = None,
-    video: Annotated[Flag, Parameter(group=CAMERA)] = False,
-    task: Annotated[str | None, Parameter(group=OUTPUT)] = None,
-    licence: Annotated[str, Parameter(name=["--licence", "--license"], group=OUTPUT)] = "cc-by-4.0",
+    *sources: str,
+    files: DatasetFiles,
+    taken: TakenOptions = TakenOptions(),
+    expert: ExpertOptions = ExpertOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Write runs as a dataset from which policies learn: for LeRobot, or for robomimic.
+    """Write demonstrations as a dataset from which policies learn, for LeRobot or robomimic.
 
     A demonstration is a scene and what the hands did. So each run is done again from its folder, to
     the bit, and images and observations are taken meanwhile: of one demonstration as often as you
@@ -57,65 +50,109 @@ def dataset(
     scalpel-sim view incise-v0 --hand live --out demos/first
     scalpel-sim dataset demos/* --cameras endoscope:128x128 overview:128x96 -o cuts
     scalpel-sim dataset demos/* --format robomimic --fps 20 -o cuts_robomimic
+    scalpel-sim dataset incise-v0 --episodes 200 --cameras endoscope:64x64 -o expert
     ```
 
     Args:
-        runs: Folders of runs that a hand, a device or a script led, each one an episode.
-        output: Folder of the dataset, which must be new. It appears when it is whole.
-        form: lerobot, version 3.0 of its format; or robomimic, a file of HDF5.
-        cameras: Cameras, each with the size of its images: NAME:WIDTHxHEIGHT [default: those of
-            `[observe]` of the scene].
-        fps: Control steps a second [default: as `[act]` has them, 50].
-        video: Write the images as videos, by the ffmpeg on the PATH: smaller, and not without loss.
-            For lerobot alone.
-        task: The task in words, for policies that read them [default: what the scene is about].
-        licence: Licence of the dataset, as hubs write it.
+        sources: Folders of runs that a hand, a device or a script led, each one an episode; or
+            tasks by their name, or a FILE.toml, which their experts do.
     """
     with log_to_stderr(printing):
-        _check(runs, form, video=video)
-        sizes = None if cameras is None else _sized(cameras)
+        _check(sources, files, taken)
+        sizes = None if taken.cameras is None else _sized(taken.cameras)
         from scalpel_sim.camera.gl_context import renderer_name
         from scalpel_sim.datasets.card import Card
         from scalpel_sim.datasets.dataset import write_dataset
-        from scalpel_sim.datasets.recorded_runs import recorded_run
-        from scalpel_sim.datasets.repeated_run import RepeatedRun, RunRequest, expect_alike
+        from scalpel_sim.datasets.taking import DatasetRequest, expect_alike
         from scalpel_sim.datasets.whole_folder import expect_new_folder
         from scalpel_sim.runs.prepared_run import load_kernels
 
-        expect_new_folder(output)
-        request = RunRequest(sizes, fps, task)
+        expect_new_folder(files.output)
         stop = StopSignals()
-        episodes = [
-            RepeatedRun(
-                recorded_run(folder),
-                request,
-                progress=partial(progress, options=printing),
-                stop_reason=lambda: stop.reason,
-            )
-            for folder in runs
-        ]
-        expect_alike(episodes)
-        renderer = renderer_name() if episodes[0].cameras else None
-        for episode in episodes:
-            load_kernels(printing, episode.run.scene)
-        layout = episodes[0].layout()
-        card = Card(output.name, _FORMS[form], licence, renderer, layout)
-        write = partial(_writer, form, layout, is_video=video)
+        found = _Found(DatasetRequest(sizes, taken.fps, files.task), printing, stop)
+        for source in sources:
+            found.add(source, expert.seeds)
+        expert.check(has_expert=found.has_expert)
+        renderer = renderer_name() if found.demonstrations[0].cameras else None
+        for scene in found.scenes:
+            load_kernels(printing, scene)
+        expect_alike(found.demonstrations)
+        layout = found.demonstrations[0].layout()
+        card = Card(files.output.name, _FORMS[files.form], files.licence, renderer, layout)
+        write = partial(_writer, files.form, layout, is_video=taken.video)
+        tell = partial(_tell, printing)
         with stop:
-            written = write_dataset(output, episodes, write, card, partial(_tell, printing))
-    _report(output, written, card, printing)
+            written = write_dataset(files.output, found.demonstrations, write, card, tell)
+    _report(files.output, written, card, printing)
 
 
-def _check(runs: Sequence[Path], form: str, *, video: bool) -> None:
+class _Found:
+    """Demonstrations that were asked for, in order.
+
+    Args:
+        request: What is taken of them.
+        printing: What is printed meanwhile.
+        stop: Ends them.
+    """
+
+    def __init__(
+        self, request: "DatasetRequest", printing: PrintOptions, stop: StopSignals
+    ) -> None:
+        self._request, self._stop = request, stop
+        self._progress = partial(progress, options=printing)
+        self.demonstrations: list[TakenDemonstration] = []
+        """The demonstrations."""
+        self.scenes: list[Scene] = []
+        """Their scenes."""
+        self.has_expert = False
+        """Whether one is of an expert."""
+
+    def add(self, source: str, seeds: range) -> None:
+        """Add the run in a folder, or the demonstrations of the expert of a task.
+
+        Args:
+            source: The folder, or the task.
+            seeds: Seeds of the demonstrations of an expert.
+
+        Raises:
+            UsageError: there is no such run or task.
+        """
+        from scalpel_sim.datasets.expert_demonstration import ExpertDemonstration, ExpertTask
+        from scalpel_sim.datasets.recorded_runs import recorded_run
+        from scalpel_sim.datasets.repeated_run import RepeatedRun
+        from scalpel_sim.scene.read import TASK_SCENES, read_scene, scene_called
+
+        request, bar = self._request, self._progress
+
+        def stop_reason() -> str | None:
+            return self._stop.reason
+
+        if source not in TASK_SCENES and not is_toml_file(source):
+            run = recorded_run(Path(source))
+            self.scenes.append(run.scene)
+            self.demonstrations.append(
+                RepeatedRun(run, request, progress=bar, stop_reason=stop_reason)
+            )
+            return
+        scene = read_scene(source) if is_toml_file(source) else scene_called(source)
+        of = ExpertTask(scene, request, progress=bar, stop_reason=stop_reason)
+        self.scenes.append(of.scene)
+        self.has_expert = True
+        self.demonstrations += [ExpertDemonstration(of, seed) for seed in seeds]
+
+
+def _check(sources: Sequence[str], files: DatasetFiles, taken: TakenOptions) -> None:
     """Refuse a request that makes no sense, or for which something is not installed.
 
     Raises:
         UsageError: it is one.
     """
-    if not runs:
+    if not sources:
         raise UsageError(
-            "no run is given: name folders that `scalpel-sim run` or `view --hand live` wrote"
+            "no run is given: name folders that `scalpel-sim run` or `view --hand live` wrote, or "
+            "tasks"
         )
+    form, video = files.form, taken.video
     if form == "lerobot" and find_spec("pyarrow") is None:
         raise UsageError(
             "a dataset for LeRobot needs pyarrow, which is not installed: pip install "

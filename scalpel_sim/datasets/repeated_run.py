@@ -1,21 +1,23 @@
 """`RepeatedRun`: a run that is done again, frame by frame as it was, while it is observed."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
 from bridge import InProcessLink
 from scalpel_sim.camera.camera import Camera
-from scalpel_sim.datasets.demonstration import (
-    DatasetLayout,
-    DatasetQuantity,
-    Seen,
-    Transition,
-)
-from scalpel_sim.datasets.hand_poses import HandActions, HandPose, action_names, poses_of_hands
+from scalpel_sim.datasets.demonstration import DatasetLayout, Seen, Transition
+from scalpel_sim.datasets.hand_poses import HandActions, poses_of_hands
 from scalpel_sim.datasets.recorded_runs import RecordedRun
+from scalpel_sim.datasets.taking import (
+    DatasetRequest,
+    ShowProgress,
+    cameras_of,
+    layout_of,
+    seen_now,
+    unseen_progress,
+)
 from scalpel_sim.errors import Interrupted, UsageError
 from scalpel_sim.learning.felt_wrench import FeltWrench
 from scalpel_sim.learning.observations import Observer, Sensor
@@ -26,13 +28,7 @@ from scalpel_sim.recording.growing_file import FileSum
 from scalpel_sim.recording.recording import Recording
 from scalpel_sim.runs.resumption import RepeatedFrames, Resumption
 from scalpel_sim.scene.act_table import ActTable, hands_led
-from scalpel_sim.scene.arm_tables import BLADE_NAME
-from scalpel_sim.scene.observe_table import (
-    CameraTable,
-    ObserveTable,
-    SensorTable,
-    quantities_shown,
-)
+from scalpel_sim.scene.observe_table import ObserveTable, SensorTable, quantities_shown
 from scalpel_sim.scoring.score import Score
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 
@@ -44,34 +40,6 @@ _WHOLE = 1e-9
 
 _FASTEST_ACTION = 1.0 + 1e-5
 """Number of an action beyond which it is faster than the limits: 1, and single precision."""
-
-AfterFrame = Callable[[Simulation], None]
-"""Called after each frame."""
-
-
-def _silent(seconds: float) -> AbstractContextManager[AfterFrame]:
-    """Return a progress that nobody sees."""
-    return nullcontext(lambda simulation: None)
-
-
-_WORDS = {
-    "hands": "hands",
-    "keys": "observations",
-    "cameras": "cameras",
-    "fps": "control steps a second",
-}
-"""Words for what all runs of a dataset have alike."""
-
-
-class RunRequest(NamedTuple):
-    """Request of what is taken of runs."""
-
-    cameras: Sequence[CameraTable] | None = None
-    """Cameras and the sizes of their images; None: those of `[observe]` of the scene."""
-    fps: int | None = None
-    """Control steps a second; None: as `[act]` of the scene has it."""
-    task: str | None = None
-    """The task in words; None: what the scene says it is about."""
 
 
 class RepeatedRun:
@@ -90,13 +58,15 @@ class RepeatedRun:
     def __init__(
         self,
         run: RecordedRun,
-        request: RunRequest = RunRequest(),
+        request: DatasetRequest = DatasetRequest(),
         *,
-        progress: Callable[[float], AbstractContextManager[AfterFrame]] = _silent,
+        progress: ShowProgress = unseen_progress,
         stop_reason: Callable[[], str | None] = lambda: None,
     ) -> None:
         self.run, scene = run, run.scene
         """The run."""
+        self.name = str(run.folder)
+        """Name of it in messages."""
         self.task = request.task or scene.about or scene.name
         """The task in words."""
         self.scene_text = run.scene_text
@@ -126,9 +96,8 @@ class RepeatedRun:
         """
         simulation = _prepared(self.run)
         observer = Observer(simulation, self.keys, 1.0 / self.fps)
-        with ExitStack() as stack:
-            self._enter_cameras(simulation, stack)
-        return self._layout_of(simulation, observer)
+        with cameras_of(simulation, self.cameras):
+            return layout_of(simulation, observer.shapes(), self)
 
     def transitions(self) -> Iterator[Transition]:
         """Yield its control steps.
@@ -147,11 +116,10 @@ class RepeatedRun:
                 f"{n_frames}; a demonstration has one step at least"
             )
         with (
-            ExitStack() as stack,
+            cameras_of(simulation, self.cameras) as cameras,
             self._progress(n_steps / self.fps) as after_frame,
             no_garbage_collection(),
         ):
-            cameras = self._enter_cameras(simulation, stack)
             steps = _Steps(self, simulation, cameras, recorded)
             before = steps.seen_first()
             for i in range(n_steps):
@@ -199,44 +167,6 @@ class RepeatedRun:
             )
         return round(frames)
 
-    def _enter_cameras(self, simulation: Simulation, stack: ExitStack) -> dict[str, Camera]:
-        """Return its cameras by name, which the stack closes.
-
-        Raises:
-            UsageError: no camera has such a name.
-        """
-        found: dict[str, Camera] = {}
-        for row in self.cameras:
-            width, height = row.size
-            first = next(iter(found.values()), None)
-            if first is None:
-                camera = stack.enter_context(
-                    Camera(simulation, row.name, width=width, height=height)
-                )
-            else:
-                camera = first.another(row.name, width=width, height=height)
-            found[row.name] = camera
-        return found
-
-    def _layout_of(self, simulation: Simulation, observer: Observer) -> DatasetLayout:
-        """Return what each control step has."""
-        of_hands = (BLADE_NAME, *(each.name for each in simulation.graspers))
-        quantities = []
-        for name, shown in observer.shapes().items():
-            names = tuple(f"{name}_{each}" for each in shown.names)
-            shape = shown.low.shape
-            quantities.append(
-                DatasetQuantity(name, shape, names if len(shape) == 1 else None, name in of_hands)
-            )
-        names = action_names(self.hands)
-        return DatasetLayout(
-            self.fps,
-            simulation.arm.name,
-            tuple(quantities),
-            {row.name: (row.size[1], row.size[0]) for row in self.cameras},
-            DatasetQuantity("action", (len(names),), names),
-        )
-
 
 class _Steps:
     """The control steps of a run that is done again.
@@ -277,7 +207,8 @@ class _Steps:
 
     def seen_first(self) -> Seen:
         """Return what is observed before the first frame."""
-        return self._seen(self._observer.now(), poses_of_hands(self._simulation))
+        poses = poses_of_hands(self._simulation)
+        return seen_now(self._simulation, self._observer.now(), poses, self._cameras)
 
     def transition(self, before: Seen, *, is_last: bool) -> Transition:
         """Return the control step whose frames were done.
@@ -287,7 +218,8 @@ class _Steps:
             is_last: Whether the run ends with it.
         """
         poses = poses_of_hands(self._simulation)
-        after = self._seen(self._observer.after_step(self._felt.mean, self._felt.peak), poses)
+        observed = self._observer.after_step(self._felt.mean, self._felt.peak)
+        after = seen_now(self._simulation, observed, poses, self._cameras)
         self._felt.begin()
         reward = 0.0 if self._payment is None else self._payment.after_step()
         is_success = self._payment is not None and self._payment.is_success
@@ -301,14 +233,6 @@ class _Steps:
         terms = {name: each for name, each in score.terms().items() if np.isfinite(each)}
         return self._payment.is_success, terms
 
-    def _seen(self, observations: dict[str, np.ndarray], poses: dict[str, HandPose]) -> Seen:
-        """Return what is observed now."""
-        numbers = [self._simulation.time]
-        for pose in poses.values():
-            numbers += pose.numbers
-        images = {name: camera.rgb() for name, camera in self._cameras.items()}
-        return Seen(observations, images, np.array(numbers))
-
 
 def _prepared(run: RecordedRun) -> Simulation:
     """Return the simulation of a run, at its start.
@@ -317,20 +241,3 @@ def _prepared(run: RecordedRun) -> Simulation:
     """
     tissue = make_tissue(run.scene)
     return prepare(run.scene, InProcessLink(tissue, run.scene.name))
-
-
-def expect_alike(runs: Sequence[RepeatedRun]) -> None:
-    """Refuse runs of which there is no one dataset.
-
-    Raises:
-        UsageError: two have other hands, numbers, cameras or control steps.
-    """
-    first = runs[0]
-    for other in runs[1:]:
-        for what in ("hands", "keys", "cameras", "fps"):
-            ours, theirs = (getattr(each, what) for each in (first, other))
-            if ours != theirs:
-                raise UsageError(
-                    f"{other.run.folder} has other {_WORDS[what]} than {first.run.folder}: "
-                    f"{theirs}, not {ours}; make a dataset of each"
-                )

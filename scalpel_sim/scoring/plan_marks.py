@@ -38,6 +38,8 @@ class MarkedPlan:
     def __init__(self, plan: Plan, tissue: Tissue) -> None:
         from scipy.spatial import cKDTree  # 0.2 s, and only here
 
+        self.plan = plan
+        """The plan."""
         into, points = plan.into, plan.surface.points
         flat_stations, flat_points = (
             each - np.outer(each @ into, into) for each in (plan.stations, points)

@@ -43,7 +43,7 @@ def plan_marks(simulation: Simulation) -> PlanMarks | None:
     result = simulation.bridge.result
     now = simulation.n_frames, 0 if result is None else result.n_tetrahedra
     before, marked = _plans.get(simulation, ((0, 0), None))
-    if marked is None:
+    if marked is None or marked.plan is not score.plan:  # another one in each episode
         marked = MarkedPlan(score.plan, link.tissue)
     elif now[0] < before[0] or now[1] < before[1]:  # the body has gone back to an earlier state
         marked.locate(link.tissue)

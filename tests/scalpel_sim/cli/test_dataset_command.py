@@ -9,10 +9,12 @@ import pytest
 from scalpel_sim.cli import dataset_command
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.datasets.recorded_runs import recorded_run
-from scalpel_sim.datasets.repeated_run import RepeatedRun, RunRequest
+from scalpel_sim.datasets.repeated_run import RepeatedRun
 from scalpel_sim.datasets.robomimic_writer import FILE
+from scalpel_sim.datasets.taking import DatasetRequest
 from scalpel_sim.errors import EXIT_OK, EXIT_WRONG_USE
 from tests.scalpel_sim.datasets.recorded_demonstrations import (
+    SCENE,
     led_folder,
     slab_task,
 )
@@ -36,14 +38,15 @@ def refused(capsys, *arguments):
 
 
 def steps_of(folder, **request):
-    return list(RepeatedRun(recorded_run(folder), RunRequest(**request)).transitions())
+    return list(RepeatedRun(recorded_run(folder), DatasetRequest(**request)).transitions())
 
 
 def test_runs_become_a_dataset_for_lerobot(led_folder, tmp_path, capsys, renderer):
     out = tmp_path / "cuts"
     asked = (led_folder, led_folder, "--cameras", "endoscope:32x24", "overview:16x16")
-    found = written(capsys, *asked, "--task", "Cut the slab.", "-o", out)
-    steps = 2 * steps_of(led_folder, cameras=())
+    rate = ("--fps", "10")
+    found = written(capsys, *asked, *rate, "--task", "Cut the slab.", "-o", out)
+    steps = 2 * steps_of(led_folder, cameras=(), fps=10)
     assert (found["episodes"], found["steps"], found["succeeded"]) == (2, len(steps), 0)
     table = pq.read_table(out / "data" / "chunk-000" / "file-000.parquet")
     for column, name in (("wrench", "wrench"), ("tissue.points", "points:8")):
@@ -69,9 +72,9 @@ def test_the_cameras_of_the_scene_are_taken_where_none_is_named(
 
 def test_runs_become_a_file_for_robomimic(led_folder, tmp_path, capsys, renderer):
     out = tmp_path / "cuts"
-    asked = (led_folder, "--format", "robomimic", "--cameras", "overview:16x12")
+    asked = (led_folder, "--format", "robomimic", "--cameras", "overview:16x12", "--fps", "10")
     written(capsys, *asked, "--license", "mit", "-o", out)
-    steps = steps_of(led_folder, cameras=())
+    steps = steps_of(led_folder, cameras=(), fps=10)
     with h5py.File(out / FILE) as file:
         demo = file["data/demo_0"]
         assert np.array_equal(demo["actions"], [step.action for step in steps])
@@ -145,3 +148,19 @@ def test_an_interrupted_command_keeps_what_is_whole(led_folder, tmp_path, capsys
     assert "has the 1 of 2 demonstrations before it" in capsys.readouterr().err
     info = json.loads((tmp_path / "cuts" / "meta" / "info.json").read_text())
     assert info["total_frames"] == n_steps
+
+
+def test_experts_of_tasks_give_demonstrations_by_the_number(tmp_path, capsys):
+    scene = tmp_path / "slab_task.toml"
+    scene.write_text(SCENE)
+    asked = (scene, "--episodes", "2", "--seed", "7", "--cameras", "--format", "robomimic")
+    found = written(capsys, *asked, "-o", tmp_path / "cuts")
+    assert (found["episodes"], found["succeeded"]) == (2, 2)
+    told = json.loads((tmp_path / "cuts" / "provenance.json").read_text())
+    assert [each["seed"] for each in told["episodes"]] == [7, 8]
+
+
+def test_options_about_experts_are_refused_without_one(led_folder, tmp_path, capsys):
+    out = ("-o", tmp_path / "cuts")
+    assert "no task is given" in refused(capsys, led_folder, "--episodes", "2", *out)
+    assert "at least 1" in refused(capsys, "incise-v0", "--episodes", "0", *out)

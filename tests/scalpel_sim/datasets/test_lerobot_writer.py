@@ -1,5 +1,7 @@
 import io
 import json
+import shutil
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -163,3 +165,35 @@ def test_a_video_of_odd_sides_is_refused(tmp_path):
     odd = LAYOUT._replace(images={"endoscope": (12, 15)})
     with pytest.raises(UsageError, match=r"15x12.*even"):
         LeRobotWriter(tmp_path, odd, is_video=True)
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_videos_have_a_frame_for_each_control_step_of_an_episode(tmp_path):
+    dataset = written(
+        tmp_path / "film", [DrawnDemonstration(0, 5), DrawnDemonstration(1, 9)], is_video=True
+    )
+    info = dataset.read("meta/info.json")
+    assert info["features"][IMAGES]["dtype"] == "video"
+    assert info["features"][IMAGES]["info"]["video.fps"] == 50
+    for row in dataset.rows:
+        place = {key: row[f"videos/{IMAGES}/{key}"] for key in ("chunk_index", "file_index")}
+        path = dataset.folder / info["video_path"].format(video_key=IMAGES, **place)
+        assert len(frames_of(path)) == row["length"]
+        assert row[f"videos/{IMAGES}/to_timestamp"] == pytest.approx(row["length"] / 50)
+    assert IMAGES not in dataset.read("data/chunk-000/file-000.parquet").schema.names
+
+
+def test_a_video_of_an_episode_that_fails_is_not_there(tmp_path):
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed")
+    writer = LeRobotWriter(tmp_path, LAYOUT, is_video=True)
+    with pytest.raises(RuntimeError, match="the tissue tore"):
+        writer.add(DrawnDemonstration(1, 3, RuntimeError("the tissue tore")))
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def frames_of(path: Path) -> np.ndarray:
+    """Return the frames of a video as bytes, shape (n, height, width, 3)."""
+    command = ["ffmpeg", "-loglevel", "error", "-i", str(path), "-f", "rawvideo"]
+    raw = subprocess.run([*command, "-pix_fmt", "rgb24", "-"], capture_output=True, check=True)
+    return np.frombuffer(raw.stdout, np.uint8).reshape(-1, 12, 16, 3)

@@ -10,7 +10,8 @@ import pytest
 from scalpel_sim import Camera, prepare
 from scalpel_sim.datasets.hand_poses import poses_of_hands
 from scalpel_sim.datasets.recorded_runs import recorded_run
-from scalpel_sim.datasets.repeated_run import RepeatedRun, RunRequest, expect_alike
+from scalpel_sim.datasets.repeated_run import RepeatedRun
+from scalpel_sim.datasets.taking import DatasetRequest, expect_alike
 from scalpel_sim.errors import Interrupted, RunError, UsageError
 from scalpel_sim.learning import Episode
 from scalpel_sim.scene.observe_table import CameraTable
@@ -27,7 +28,7 @@ __all__ = ["led_folder", "script_folder", "slab_task"]
 N_FRAMES = 20
 """Frames of a control step of 20 ms."""
 
-NO_IMAGES = RunRequest(cameras=())
+NO_IMAGES = DatasetRequest(cameras=())
 
 
 def taken(folder, request=NO_IMAGES):
@@ -108,7 +109,7 @@ def test_rewards_add_up_to_what_was_achieved(scripted):
 
 def test_images_are_those_of_their_instants(script_folder, renderer):
     rows = [CameraTable(name="endoscope", size=(32, 24)), CameraTable(name="overview")]
-    _, steps = taken(script_folder, RunRequest(cameras=rows, fps=5))
+    _, steps = taken(script_folder, DatasetRequest(cameras=rows, fps=5))
     simulation = prepare(recorded_run(script_folder).scene)
     with Camera(simulation, "endoscope", width=32, height=24) as camera:
         other = camera.another("overview", width=128, height=128)

@@ -15,6 +15,7 @@ from scalpel_sim.preparation.tissue import make_tissue
 from scalpel_sim.scene.act_table import ActTable
 from scalpel_sim.scene.task_table import TaskTable
 from scalpel_sim.scene.vary_table import VaryTable
+from scalpel_sim.viewer.judged import plan_marks
 from tests.scalpel_sim.learning.little_task import little_task
 
 __all__ = ["little_task"]
@@ -112,6 +113,14 @@ def test_the_plan_and_what_is_shown_of_it_move_with_the_line(episode):
     (x, y), angle = np.diff(turned, axis=0)[0], np.arctan2(0.002, 0.02)
     assert np.arctan2(y, x) == pytest.approx(angle - np.radians(12.0), abs=1e-3)  # from above
     assert np.allclose(turned.mean(0), np.mean(episode.task.line, axis=0), atol=1e-4)
+
+
+def test_the_line_that_a_page_draws_moves_too(episode):
+    lines = []
+    for across in (0.0, -2e-3):
+        begin(episode, **{"task.line.across": across})
+        lines.append(plan_marks(episode.simulation).places)
+    assert np.allclose((lines[1] - lines[0])[:, 1], 2e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("arm", ["kinematic", "full"])
