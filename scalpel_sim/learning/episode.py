@@ -218,8 +218,11 @@ class Episode:
         starts = self._variation.starts(self.drawn)
         if not starts:
             return
-        for _ in range(self.hand.start_elsewhere(starts, at_once=self.arm == KINEMATIC)):
-            self._rest()
+        if self.arm == KINEMATIC:
+            self.hand.put(starts, self.simulation)
+        else:
+            for _ in range(self.hand.go(starts)):
+                self._rest()
         for each in self.score.hands:
             each.begin_way()
 

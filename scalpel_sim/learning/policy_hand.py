@@ -101,20 +101,28 @@ class PolicyHand(Teleoperation):
             if motion is not None:
                 grasper.controller = MotionFollower(grasper.grasper, motion, simulation.frame)
 
-    def start_elsewhere(self, starts: Mapping[str, FloatArray], *, at_once: bool) -> int:
-        """Lead instruments elsewhere before an episode; return the control steps that it takes.
+    def put(self, starts: Mapping[str, FloatArray], simulation: Simulation) -> None:
+        """Put instruments that nothing carries elsewhere at once; no time passes.
 
         Args:
             starts: By how much, by name [m], tissue frame, shape (3,) each.
-            at_once: Whether they are there in the next control step: those that nothing carries.
+            simulation: The simulation that it was made for.
+        """
+        for name, by in starts.items():
+            self._instruments[name].put(by)
+            self._instruments[name].lead(simulation.time)
+        simulation.arm.step1()
+        simulation.blade.follow()
+
+    def go(self, starts: Mapping[str, FloatArray]) -> int:
+        """Begin to lead instruments elsewhere; return the control steps that it takes.
+
+        Args:
+            starts: By how much, by name [m], tissue frame, shape (3,) each.
         """
         n = 1
         for name, by in starts.items():
-            instrument = self._instruments[name]
-            if at_once:
-                instrument.put(by)
-                continue
-            pose, way = instrument.pose, float(np.linalg.norm(by))
+            pose, way = self._instruments[name].pose, float(np.linalg.norm(by))
             assert isinstance(pose, EvenPose)
             of_this = 1 + math.ceil(way / (min(self._act.speed, MOST_SPEED) * self._act.step))
             pose.n_frames = of_this * self._n_frames
