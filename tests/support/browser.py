@@ -36,8 +36,9 @@ UNTIL_DRAWN = """async () => {
 }"""
 """Resolves when all changes made so far are on the screen, as a page draws what rests."""
 
-TIMEOUT = 60_000
-"""How long a page may take [ms]: drawing in software on a busy machine is slow."""
+TIMEOUT = 180_000
+"""How long a page may take [ms]: drawing in software on a busy machine is slow. With nine busy
+processes to a core it took more than 60 s."""
 
 
 def first_installed(names: tuple[str, ...]) -> str | None:
@@ -53,7 +54,9 @@ def browser() -> Iterator[Any]:
         pytest.skip("no Chromium on this machine: apt-get install chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
     with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=executable, args=list(DETERMINISTIC))
+        chromium = driver.chromium.launch(
+            executable_path=executable, args=list(DETERMINISTIC), timeout=TIMEOUT
+        )
         yield chromium
         chromium.close()
 
