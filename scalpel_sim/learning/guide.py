@@ -48,5 +48,6 @@ class Guide:
 
 def _nearest(points: FloatArray, wanted: FloatArray) -> IntArray:
     """Return the points that are nearest to some places, each once."""
-    found = [int(((points - place) ** 2).sum(axis=1).argmin()) for place in wanted]
-    return np.unique(found)
+    # |p - w|^2 without |w|^2, which is the same for all points.
+    squares = (points**2).sum(axis=1) - 2.0 * np.einsum("wk,pk->wp", wanted, points)
+    return np.unique(squares.argmin(axis=1))
