@@ -90,6 +90,7 @@ class ExpertDemonstration:
         self.task, self.cameras, self.fps, self.hands = of.task, of.cameras, of.fps, of.hands
         self._n_steps, self._is_success = 0, False
         self._terms: dict[str, float] = {}
+        self._variation: dict[str, float] = {}
 
     @property
     def scene_text(self) -> str:
@@ -121,6 +122,7 @@ class ExpertDemonstration:
         episode = self._of.episode
         simulation, most = episode.simulation, episode.max_steps or LONGEST_EPISODE
         episode.reset(np.random.default_rng(self._seed))
+        self._variation = dict(episode.drawn)
         expert = Expert(episode)
         with (
             cameras_of(simulation, self.cameras) as cameras,
@@ -162,6 +164,7 @@ class ExpertDemonstration:
             "task": self.task,
             "led_by": "an expert",
             "seed": self._seed,
+            "variation": self._variation,
             "arm": self._of.episode.arm,
             "steps": self._n_steps,
             "steps_faster_than_limits": 0,

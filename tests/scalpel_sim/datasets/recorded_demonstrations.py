@@ -46,6 +46,10 @@ covered = 10.0
 off_plan = -1e5
 success = 5.0
 
+[[vary]]
+what = "material.toughness"
+range = [0.8, 1.2]
+
 [observe]
 state = ["blade", "wrench", "wrench_peak", "target", "depth", "left", "points:8"]
 cameras = [{ name = "overview", size = [48, 36], segmentation = true }]

@@ -40,13 +40,17 @@ def test_actions_of_an_expert_do_the_same_in_an_episode_of_the_same_seed(done, s
     assert sum(step.reward for step in steps) > 14.0  # 10 for the plan, 5 for success
 
 
-def test_an_expert_ends_with_success_and_says_by_which_seed(done):
+def test_an_expert_ends_with_success_and_says_by_which_seed_and_numbers(done, slab_task):
     demonstration, steps = done
     told = demonstration.provenance()
     assert [step.is_done for step in steps] == [False] * (len(steps) - 1) + [True]
     assert steps[-1].is_success
     assert (told["seed"], told["steps"], told["success"]) == (SEED, len(steps), True)
     assert 'kind = "traced"' in demonstration.scene_text
+    episode = Episode(slab_task)
+    episode.reset(np.random.default_rng(SEED))
+    assert 0.8 < episode.drawn["material.toughness"] < 1.2
+    assert told["variation"] == episode.drawn
 
 
 def test_a_demonstration_is_the_same_again(task, done):
