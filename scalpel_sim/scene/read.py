@@ -55,7 +55,10 @@ TASK_SCENES = (
     "excise-v0",
     "gallbladder-v0",
     "incise-v0",
+    "incise_taut-v0",
+    "ligament-v0",
     "retract-v0",
+    "spare_vessel-v0",
 )
 """Names of the tasks that come with it. One never changes what it means: changed, it has another
 version."""
