@@ -133,11 +133,21 @@ class SimulationState:
         numbers = content["n_frames"], content["wall_seconds"]
         return cls(content["settings"], arm, places, tissue, *numbers)
 
-    def to_bytes(self) -> bytes:
+    def beside(self, name: str) -> np.ndarray | None:
+        """Return an array that was written beside a state from bytes; None: there is none."""
+        try:
+            return self._tissue.beside(name)
+        except StateError:
+            return None
+
+    def to_bytes(self, beside: Mapping[str, np.ndarray] | None = None) -> bytes:
         """Return the state as bytes: a NumPy archive (`.npz`) of plain arrays and of JSON.
 
         What leads arm and graspers is not in it: the stroke and the motions of the simulation that
         loads it do, which are the same; of a hand, what was recorded.
+
+        Args:
+            beside: Arrays that are written with it, by names of their own.
 
         Raises:
             StateError: the state is from bytes itself.
@@ -151,8 +161,8 @@ class SimulationState:
             "n_frames": self.n_frames,
         }
         text = np.frombuffer(json.dumps(content, allow_nan=False).encode(), np.uint8)
-        beside: dict[str, np.ndarray] = {_CONTENT: text, _ARM: self._arm, _WHERE: self._places}
-        return self._tissue.to_bytes(self._source, beside)
+        ours: dict[str, np.ndarray] = {_CONTENT: text, _ARM: self._arm, _WHERE: self._places}
+        return self._tissue.to_bytes(self._source, {**(beside or {}), **ours})
 
     def load_into(self, simulation: SavedSimulation) -> None:
         """Put a simulation to this state.

@@ -152,6 +152,24 @@ class LiveInstrument(abc.ABC):
         """End its record at time `t` [s]."""
         self._record.finish(t)
 
+    def state(self) -> dict[str, list[float]]:
+        """Return what leads it on from here, besides its record and a way that it was sent."""
+        pose = self.pose
+        places = (pose.middle, pose.rotation, pose.wanted, pose.wanted_rotation)
+        return {"row": self._row.tolist(), "pose": np.concatenate(places).tolist()}
+
+    def return_to(self, state: dict[str, list[float]]) -> None:
+        """Return to what `state` returned; the record begins there."""
+        pose = self.pose
+        pose.rest()
+        self._row[:] = state["row"]
+        places = np.split(np.array(state["pose"]), (3, 7, 10))
+        for array, now in zip(
+            (pose.middle, pose.rotation, pose.wanted, pose.wanted_rotation), places, strict=True
+        ):
+            array[:] = now
+        self._record.take_rows()
+
     def take_rows(self) -> list[list[float]]:
         """Return the rows that were recorded since the last call."""
         return self._record.take_rows()
@@ -190,6 +208,15 @@ class LiveBlade(LiveInstrument):
     def normal(self) -> FloatArray:
         """See `LiveInstrument.normal`."""
         return self._frame.vectors_to_world(self.axes[0])
+
+    def state(self) -> dict[str, list[float]]:
+        """See `LiveInstrument.state`."""
+        return super().state() | {"numbers": self._numbers}
+
+    def return_to(self, state: dict[str, list[float]]) -> None:
+        """See `LiveInstrument.return_to`."""
+        super().return_to(state)
+        self._numbers = list(state["numbers"])
 
     def close_jaws(self, closed: bool) -> None:
         """Do nothing: it has none."""
@@ -249,6 +276,18 @@ class LiveGrasper(LiveInstrument):
     def normal(self) -> FloatArray:
         """See `LiveInstrument.normal`."""
         return self._frame.vectors_to_world(self.axes[2])
+
+    def state(self) -> dict[str, list[float]]:
+        """See `LiveInstrument.state`."""
+        jaws = [self._at.opening, self._wanted_opening]
+        return super().state() | {"numbers": self.numbers[:9], "jaws": jaws}
+
+    def return_to(self, state: dict[str, list[float]]) -> None:
+        """See `LiveInstrument.return_to`."""
+        super().return_to(state)
+        at, approach, across = (state["numbers"][i : i + 3] for i in (0, 3, 6))
+        opening, self._wanted_opening = state["jaws"]
+        self._at = self._at._replace(at=at, approach=approach, across=across, opening=opening)
 
     def close_jaws(self, closed: bool) -> None:
         """Close or open the jaws."""

@@ -10,6 +10,7 @@ from gymnasium.spaces import Box, Dict
 from scalpel_sim.camera.camera import Camera
 from scalpel_sim.errors import UsageError
 from scalpel_sim.learning.episode import Episode, Outcome
+from scalpel_sim.learning.episode_state import EpisodeState
 from scalpel_sim.learning.images import ImageTaker
 from scalpel_sim.learning.live_page import LivePage
 from scalpel_sim.scene.read import read_scene, scene_called
@@ -114,17 +115,29 @@ class TissueEnv(gymnasium.Env[Any, Any]):
 
         Args:
             seed: Seed of all that is random; None: as before.
-            options: {"variation": numbers of `[[vary]]` by name}, as `info["variation"]` has
-                had them, in place of those that are drawn.
+            options: `variation`: numbers of `[[vary]]` by name, as `info["variation"]` has had
+                them, in place of those that are drawn. Or `state`: bytes of `save_state` at which
+                the episode begins. What is random then goes on as it did, unless there is a seed.
 
         Raises:
             UsageError: there is no such option, or a number is missing, unknown or out of range.
+            StateError: the state is of another task, or no state.
         """
+        given = dict(options or {})
+        state, variation = given.pop("state", None), given.pop("variation", None)
+        if given:
+            name = next(iter(given))
+            raise UsageError(f"reset has no option '{name}'; it has variation and state")
+        if state is not None and variation is not None:
+            raise UsageError("reset has a state and a variation: a state has its own")
         super().reset(seed=seed)
-        for name in options or {}:
-            if name != "variation":
-                raise UsageError(f"reset has no option '{name}'; it has variation")
-        self.episode.reset(self.np_random, (options or {}).get("variation"))
+        if state is None:
+            self.episode.reset(self.np_random, variation)
+        elif seed is None:
+            self.episode.load_state(EpisodeState.from_bytes(state))
+            self.np_random = self.episode.rng
+        else:
+            self.episode.load_state(EpisodeState.from_bytes(state), self.np_random)
         if self.render_mode == HUMAN:
             self._live_page()
         return self._observed(), self._info(None)
@@ -138,6 +151,14 @@ class TissueEnv(gymnasium.Env[Any, Any]):
             self._live_page().wait(self.episode.act_table.step)
         observed, info = self._observed(), self._info(outcome)
         return observed, outcome.reward, outcome.terminated, outcome.truncated, info
+
+    def save_state(self) -> bytes:
+        """Return the episode as it is now, for `reset(options={"state": ...})`.
+
+        Raises:
+            StateError: its simulation has failed.
+        """
+        return self.episode.save_state().to_bytes()
 
     def _observed(self) -> ObservedArrays:
         """Return the observation after the last control step."""

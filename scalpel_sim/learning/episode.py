@@ -13,6 +13,12 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.instruments.geom_coupling import GeomCouplingError
 from scalpel_sim.instruments.grip import GripError
 from scalpel_sim.instruments.scene_graspers import motions_of
+from scalpel_sim.learning.episode_state import (
+    EpisodeState,
+    generator_at,
+    settings_of,
+    state_of_generator,
+)
 from scalpel_sim.learning.felt_wrench import FeltWrench
 from scalpel_sim.learning.observations import Observer, Sensor, Shown
 from scalpel_sim.learning.payment import Payment
@@ -25,7 +31,7 @@ from scalpel_sim.scene.observe_table import ObserveTable, quantities_shown
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scoring.score import Score
 from scalpel_sim.strokes.kind import StrokeTable
-from tissue import FloatArray, TissueError, Wrench
+from tissue import FloatArray, StateError, TissueError, Wrench
 
 KINEMATIC, FULL = "kinematic", "full"
 """Levels: instruments that are where their hands are, or arms that MuJoCo simulates."""
@@ -102,12 +108,16 @@ class Episode:
         """Error with which the simulation failed; None: it did not."""
         self._felt = FeltWrench(simulation)
         self._payment = Payment(self.task, simulation)
+        self.rng = np.random.default_rng(0)
+        """All that is random in the episode is drawn from it."""
         self._observation: dict[str, FloatArray] = {}
+        self._settings = settings_of(scene, self.arm)
         self._rest()  # a record begins with a frame at rest
         simulation.note_start()
         self._variation = Variation(simulation, scene)
         self.drawn: dict[str, float] = {}
         """Numbers of `[[vary]]` in this episode, by name."""
+        self.reset(self.rng)  # points that are shown are chosen before a cut
 
     @property
     def strokes(self) -> tuple[StrokeTable, ...]:
@@ -156,6 +166,7 @@ class Episode:
             UsageError: a number is missing, unknown or out of its range.
         """
         given = None if variation is None else self._variation.checked(variation)
+        self.rng = rng
         self.simulation.reset()
         drawn = self._variation.draw(rng)  # in any case: then noise is the same
         self.drawn = drawn if given is None else given
@@ -203,6 +214,61 @@ class Episode:
     @property
     def observation(self) -> dict[str, FloatArray]:
         """Observation after the last control step, by name, single precision."""
+        return self._observation
+
+    def save_state(self) -> EpisodeState:
+        """Return the episode as it is now; `to_bytes` of it makes bytes.
+
+        Raises:
+            StateError: its simulation has failed.
+        """
+        if self.fault is not None:
+            raise StateError("the simulation has failed in this episode: call reset() first")
+        content = {
+            "settings": self._settings,
+            "n_steps": self.n_steps,
+            "variation": self.drawn,
+            "payment": self._payment.state(),
+            "generator": state_of_generator(self.rng),
+            "hand": self.hand.state(),
+            "observer": self._observer.state(),
+            "observation": {name: each.tolist() for name, each in self._observation.items()},
+        }
+        return EpisodeState(self.simulation.save_state(), content)
+
+    def load_state(
+        self, state: EpisodeState, rng: np.random.Generator | None = None
+    ) -> dict[str, FloatArray]:
+        """Return to a state, as often as wanted; return the observation of then.
+
+        What follows is to the bit what followed then.
+
+        Args:
+            state: Of this episode, or from bytes of an episode of the same scene.
+            rng: All that is random from then on is drawn from it; None: from a generator as it was
+                then.
+
+        Raises:
+            StateError: it is of another task, or of another simulation.
+        """
+        state.expect(self._settings)
+        content = state.content
+        rng = generator_at(content["generator"]) if rng is None else rng
+        self.rng, self.drawn = rng, dict(content["variation"])
+        self.simulation.reset()
+        self._variation.apply(self.drawn)  # the plan is none of what its state has
+        self._rest()  # a state is written over the results of the last frame, not of the start
+        self.simulation.load_state(state.simulation)
+        self.n_steps, self.fault = content["n_steps"], None
+        self.hand.return_to(content["hand"])
+        sensor = self._variation.sensor(self._sensor, self.drawn)
+        self._observer.begin(Sensor(sensor, self.act_table.step, rng))
+        self._observer.return_to(content["observer"])
+        self._payment.begin()
+        self._payment.return_to(content["payment"])
+        self._observation = {
+            name: np.array(each, np.float32) for name, each in content["observation"].items()
+        }
         return self._observation
 
     def _judged(self) -> Outcome:

@@ -32,6 +32,11 @@ class Guide:
         self._link, self._rest = simulation.link, points[self._places]
         self._holders: IntArray = np.full(len(self._places), -1)
 
+    @property
+    def holders(self) -> IntArray:
+        """The tetrahedron that held each place when it was looked up last, or -1."""
+        return self._holders
+
     def way(self, tip: FloatArray, is_covered: BoolArray) -> float:
         """Return the distance from the tip to the nearest place that is not cut [m]; 0: all are.
 

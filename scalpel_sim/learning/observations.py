@@ -3,11 +3,12 @@
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
+from bridge import InProcessLink
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.recording.observations import farthest_points
 from scalpel_sim.scene.arm_tables import BLADE_NAME
@@ -98,6 +99,11 @@ class PlanView:
         cut = np.bincount(self._nearest, self._areas * self._score.is_covered, N_STATIONS)
         return np.column_stack([at, cut / self._total])
 
+    @property
+    def holders(self) -> IntArray:
+        """The tetrahedron that held each place when it was looked up last, or -1."""
+        return self._holders
+
     def depth(self, rows: FloatArray, tip: FloatArray) -> FloatArray:
         """Return how deep the tip is below the nearest place, and below the plan there [m].
 
@@ -163,6 +169,15 @@ class Sensor:
         shown = self._past[0]
         return shown + self._scale * self._rng.standard_normal(6) if self._has_noise else shown
 
+    def state(self) -> list[list[float]]:
+        """Return the wrenches that it has yet to show."""
+        return [each.tolist() for each in self._past]
+
+    def return_to(self, state: list[list[float]]) -> None:
+        """Return to what `state` returned."""
+        self._past.clear()
+        self._past.extend(np.array(each) for each in state)
+
 
 class Observer:
     """Observes a simulation at the end of each control step.
@@ -202,6 +217,35 @@ class Observer:
         self.force, self.peak = np.zeros(6), 0.0
         self._shown_force = sensor.read(self.force)
         self._last = self._edge()
+
+    def state(self) -> dict[str, Any]:
+        """Return what the next observation depends on besides the simulation, as JSON has it."""
+        assert self._sensor is not None
+        tip, rotation = self._last
+        samples = self._simulation.samples.holders()
+        return {
+            "force": self.force.tolist(),
+            "peak": self.peak,
+            "sensor": self._sensor.state(),
+            "shown_force": self._shown_force.tolist(),
+            "last": [tip.tolist(), rotation.tolist()],
+            "plan": [] if self._plan is None else self._plan.holders.tolist(),
+            "samples": [[n, holders] for n, holders in samples.items()],
+        }
+
+    def return_to(self, state: dict[str, Any]) -> None:
+        """Return to what `state` returned, after `begin`, in the simulation of then."""
+        assert self._sensor is not None
+        simulation, link = self._simulation, self._simulation.link
+        self.force, self.peak = np.array(state["force"]), state["peak"]
+        self._sensor.return_to(state["sensor"])
+        self._shown_force = np.array(state["shown_force"])
+        tip, rotation = state["last"]
+        self._last = np.array(tip), np.array(rotation)
+        if self._plan is not None:
+            self._plan.holders[:] = state["plan"]
+        assert isinstance(link, InProcessLink)
+        simulation.samples.hold(link, dict(state["samples"]))
 
     def shapes(self) -> dict[str, Shown]:
         """Return shape and bounds of each quantity."""

@@ -1,5 +1,7 @@
 """`Payment`: the rewards of a task, from the terms of its score."""
 
+from typing import Any
+
 from scalpel_sim.learning.guide import Guide
 from scalpel_sim.scene.task_table import TaskTable
 from scalpel_sim.scoring.score import Score
@@ -39,6 +41,23 @@ class Payment:
             reward += self._success
             self._is_paid = True
         return reward
+
+    def state(self) -> dict[str, Any]:
+        """Return all that the next reward depends on besides the simulation, as JSON has it."""
+        holders = [] if self._guide is None else self._guide.holders.tolist()
+        return {
+            "potential": self._potential,
+            "is_success": self.is_success,
+            "is_paid": self._is_paid,
+            "guide": holders,
+        }
+
+    def return_to(self, state: dict[str, Any]) -> None:
+        """Return to what `state` returned, after `begin`."""
+        self._potential, self.is_success = state["potential"], state["is_success"]
+        self._is_paid = state["is_paid"]
+        if self._guide is not None:
+            self._guide.holders[:] = state["guide"]
 
     def _weighted(self) -> float:
         """Return the weighted sum of the terms now."""

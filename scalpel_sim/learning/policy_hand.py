@@ -93,6 +93,15 @@ class PolicyHand(Teleoperation):
         """Number of frames of a control step."""
         return self._n_frames
 
+    def state(self) -> list[dict[str, list[float]]]:
+        """Return where it leads each instrument: all that the next control step depends on."""
+        return [each.state() for each in self.instruments]
+
+    def return_to(self, state: list[dict[str, list[float]]]) -> None:
+        """Return to what `state` returned."""
+        for instrument, its in zip(self.instruments, state, strict=True):
+            instrument.return_to(its)
+
     def take_over(self, simulation: Simulation) -> None:
         """See `Teleoperation.take_over`."""
         super().take_over(simulation)

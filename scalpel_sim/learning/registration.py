@@ -11,6 +11,7 @@ OWN_SCENE = f"{NAMESPACE}/Scene-v0"
 """Id of the environment of any scene: give `scene`."""
 
 _ENTRY_POINT = "scalpel_sim.learning.environment:TissueEnv"
+_VECTOR_ENTRY_POINT = "scalpel_sim.learning.vector_env:TissueVectorEnv"
 
 
 def id_of(task: str) -> str:
@@ -26,4 +27,6 @@ def register_tasks() -> None:
     }
     for name, given in scenes.items():
         if name not in gymnasium.registry:
-            gymnasium.register(name, _ENTRY_POINT, kwargs=given)
+            gymnasium.register(
+                name, _ENTRY_POINT, vector_entry_point=_VECTOR_ENTRY_POINT, kwargs=given
+            )

@@ -58,6 +58,16 @@ class MaterialSamples:
         """Find the points in the body again at the next observation: another state is loaded."""
         self._points.clear()
 
+    def holders(self) -> dict[int, list[int]]:
+        """Return the tetrahedron that holds each point, by their number: a part of a state."""
+        return {n: points.last_holders.tolist() for n, points in self._points.items()}
+
+    def hold(self, link: InProcessLink, holders: Mapping[int, list[int]]) -> None:
+        """Continue from `holders`: a point on a face between two stays in its own one."""
+        for n, tetrahedra in holders.items():
+            self._points[n] = link.tissue.material_points(self._rest[n])
+            self._points[n].last_holders[:] = tetrahedra
+
     def positions(self, link: TissueLink, n: int) -> FloatArray:
         """Return where `n` points of the skin are [m], tissue frame, shape (n, 3).
 
