@@ -9,6 +9,7 @@ To install: pip install "scalpel-sim[examples]"
 """
 
 import argparse
+import contextlib
 import math
 import time
 from pathlib import Path
@@ -20,8 +21,16 @@ from torch import nn
 
 from scalpel_sim.learning import Expert
 
+with contextlib.suppress(ImportError):
+    # An optimiser loads it. Where Mesa, which draws without a graphics card, is loaded before, two
+    # versions of LLVM meet and the process dies.
+    import triton  # noqa: F401
+
 PIXELS = 64
 """Width and height at which a policy looks at images."""
+
+OF_TISSUE = ("target", "depth", "points")
+"""Beginnings of the names of what no arm knows."""
 
 
 def numbers(seen: dict[str, np.ndarray], obs: str) -> np.ndarray:
@@ -29,10 +38,10 @@ def numbers(seen: dict[str, np.ndarray], obs: str) -> np.ndarray:
 
     Of the state all, the plan as it lies from the tip; beside images what an arm knows of itself.
     """
+    rows = {name: each for name, each in seen.items() if each.ndim == 1}
     if obs == "images":
-        return np.concatenate([seen["blade"], seen["wrench"]])
-    rows = dict(seen)
-    if "target" in rows:
+        rows = {name: each for name, each in rows.items() if not name.startswith(OF_TISSUE)}
+    if "target" in rows and "blade" in rows:
         places = rows["target"].reshape(-1, 4).copy()
         places[:, :3] -= rows["blade"][:3]
         rows["target"] = places.ravel()

@@ -78,7 +78,7 @@ class Policy(nn.Module):
 def from_tip(rows: np.ndarray, space: gymnasium.spaces.Dict) -> torch.Tensor:
     """Return what is seen in rows, the places of the plan as they lie from the tip of the blade."""
     found = {name: rows[name] for name in space}
-    if "target" in found:
+    if "target" in found and "blade" in found:
         places = found["target"].reshape(len(found["target"]), -1, 4).copy()
         places[:, :, :3] -= found["blade"][:, None, :3]
         found["target"] = places.reshape(len(places), -1)
@@ -93,14 +93,14 @@ class Learner:
 
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
-        self.envs = gymnasium.make_vec(options.task, options.envs, "sync", obs="state")
+        self.envs = gymnasium.make_vec(options.task, options.envs, obs="state")
         self.space = self.envs.single_observation_space
         seen, _ = self.envs.reset(seed=options.seed)
         self.seen, self.begins = from_tip(seen, self.space), np.zeros(options.envs, bool)
         n_actions = self.envs.single_action_space.shape[0]
         self.policy = Policy(self.seen.shape[1], n_actions)
         self.optimizer = torch.optim.Adam(self.policy.parameters(), RATE, eps=1e-5)
-        self.n_steps, self.spread = 0, 1.0
+        self.n_steps = 0
         self.returns = np.zeros(options.envs)  # of the episodes that run
         self.ended: list[tuple[float, bool]] = []
 
@@ -161,7 +161,7 @@ class Learner:
 def train(options: argparse.Namespace) -> Policy:
     """Train, and print the learning curve."""
     learner, began, rounds = Learner(options), time.monotonic(), 0
-    print("  steps   CPU min  episodes  reward  success  noise", flush=True)
+    print("  steps   minutes  episodes  reward  success  noise", flush=True)
     while True:
         spent = (time.monotonic() - began) / (60.0 * options.minutes)
         spent = max(spent, learner.n_steps / options.steps if options.steps else 0.0)
@@ -171,8 +171,9 @@ def train(options: argparse.Namespace) -> Policy:
         rounds += 1
         if rounds % 5 == 0 and learner.ended:
             rewards, successes = np.array(learner.ended[-50:]).T
+            minutes = (time.monotonic() - began) / 60.0
             print(
-                f"{learner.n_steps:7d}  {time.process_time() / 60.0:8.1f}  {len(learner.ended):8d}"
+                f"{learner.n_steps:7d}  {minutes:8.1f}  {len(learner.ended):8d}"
                 f"  {rewards.mean():6.2f}  {100.0 * successes.mean():5.0f} %"
                 f"  {learner.policy.log_noise.exp().mean().item():.2f}",
                 flush=True,

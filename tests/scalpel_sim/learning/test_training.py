@@ -10,10 +10,10 @@ from pathlib import Path
 import gymnasium
 import pytest
 
-from scalpel_sim.learning.environment import OBSERVED_FORMS
 from scalpel_sim.learning.registration import id_of
 from scalpel_sim.scene.observe_table import CameraTable, ObserveTable
 from scalpel_sim.scene.read import TASK_SCENES, scene_called
+from tests.support.egl import needs_renderer
 
 ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "docs" / "examples" / "learning"
@@ -25,11 +25,9 @@ def cameras_of(task: str) -> tuple[CameraTable, ...]:
 
 
 FORMS = [
-    (task, obs)
-    for task in TASK_SCENES
-    for obs in OBSERVED_FORMS
-    if obs in ("state", "flat") or cameras_of(task)
+    (task, obs) for task in TASK_SCENES for obs in ("flat", "all" if cameras_of(task) else "state")
 ]
+"""Forms in which each task is checked; `all` is state and images."""
 
 
 @pytest.fixture
@@ -82,6 +80,15 @@ def test_a_clone_comes_nearer_to_the_expert(trained, tmp_path):
     assert (tmp_path / "clone.pt").stat().st_size > 10_000
 
 
+@needs_renderer
+def test_a_clone_learns_from_images_in_the_process_that_draws_them(trained):
+    task = ("--task", "scalpel_sim/Retract-v0", "--obs", "images")
+    printed = trained("clone.py", *task, "--episodes", "1", "--steps", "10")
+    errors = [float(each) for each in re.findall(r"error of an action ([\d.]+)", printed)]
+    assert len(errors) == 10 and errors[-1] < errors[0]
+
+
+@needs_renderer
 @pytest.mark.parametrize(("task", "obs"), FORMS)
 def test_the_checker_of_stable_baselines_finds_nothing(task, obs):
     checker = pytest.importorskip(
