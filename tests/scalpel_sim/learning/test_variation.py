@@ -240,6 +240,7 @@ def test_factors_of_a_part_and_of_all_multiply_and_a_layer_has_its_own(tmp_path)
     path = tmp_path / "parts.toml"
     path.write_text(PARTS)
     episode = Episode(read_scene(path))
+    episode.simulation.reset()  # nothing is varied then
     body = episode.simulation.link.tissue._stages.model.body
     before = dict(zip(body.materials.label.tolist(), body.materials.toughness, strict=True))
     drawn = {
