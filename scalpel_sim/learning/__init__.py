@@ -17,15 +17,16 @@ def __getattr__(name: str) -> object:
     """Load a public name.
 
     Raises:
-        ImportError: it needs Gymnasium, which is not installed.
+        ImportError: it needs Gymnasium or PettingZoo, which is not installed.
     """
     try:
         found: object = _load(name)
     except ModuleNotFoundError as error:
-        if error.name != "gymnasium":
+        package = {"gymnasium": "Gymnasium", "pettingzoo": "PettingZoo"}.get(error.name or "")
+        if package is None:
             raise
         raise ImportError(
-            f"scalpel_sim.learning.{name} needs Gymnasium: pip install 'scalpel-sim[learn]'"
+            f"scalpel_sim.learning.{name} needs {package}: pip install 'scalpel-sim[learn]'"
         ) from error
     return found
 

@@ -26,6 +26,9 @@ HUMAN = "human"
 RENDER_MODES = ("rgb_array", "depth_array", "rgbd_tuple", HUMAN)
 """Ways to render."""
 
+RESET_OPTIONS = ("variation", "state")
+"""Options of `reset`."""
+
 ObservedArrays = dict[str, np.ndarray] | FloatArray
 """An observation."""
 
@@ -124,7 +127,7 @@ class TissueEnv(gymnasium.Env[Any, Any]):
             StateError: the state is of another task, or no state.
         """
         given = dict(options or {})
-        state, variation = given.pop("state", None), given.pop("variation", None)
+        variation, state = (given.pop(name, None) for name in RESET_OPTIONS)
         if given:
             name = next(iter(given))
             raise UsageError(f"reset has no option '{name}'; it has variation and state")

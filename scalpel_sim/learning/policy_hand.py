@@ -77,11 +77,16 @@ class PolicyHand(Teleoperation):
     @property
     def action_names(self) -> tuple[str, ...]:
         """Name of each number of an action."""
-        found = []
+        return tuple(name for names in self.names_by_hand.values() for name in names)
+
+    @property
+    def names_by_hand(self) -> dict[str, tuple[str, ...]]:
+        """Names of the numbers of an action that lead each instrument, in order."""
+        found = {}
         for name, instrument in self._instruments.items():
             of_motion = MOTION_NAMES if instrument is self.blade else (*MOTION_NAMES, JAWS)
-            found += [f"{name}_{each}" for each in of_motion]
-        return tuple(found)
+            found[name] = tuple(f"{name}_{each}" for each in of_motion)
+        return found
 
     @property
     def led(self) -> dict[str, LiveInstrument]:

@@ -117,7 +117,7 @@ class RewardTable(TomlTable, kw_only=True, frozen=True):
     healthy: Finite = 0.0
     """Weight of the volume of other tissue that is cut out with it [1/m3]."""
     exposed: Finite = 0.0
-    """Weight of the share of a camera's picture that shows the target."""
+    """Weight of the share of the target that a camera sees."""
     work: Finite = 0.0
     """Weight of the work of the blade [1/J]."""
     time: Finite = 0.0
