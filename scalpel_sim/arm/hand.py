@@ -12,6 +12,7 @@ from scalpel_sim.arm.blade import no_such
 from scalpel_sim.arm.free_names import free_prefix
 from scalpel_sim.quaternions import (
     Matrix,
+    Quaternion,
     Vector,
     inverse,
     quaternion_of,
@@ -258,6 +259,19 @@ def lead_to(
     position[0], position[1], position[2] = x, y, z
     quaternion[0], quaternion[1], quaternion[2], quaternion[3] = wanted
     return True
+
+
+@kernel
+def edge_rotation(
+    edge: tuple[float, float, float, float, float, float, float, float, float],
+) -> Quaternion:
+    """Return the rotation of an edge (w, x, y, z): NaN without an edge.
+
+    Args:
+        edge: Tip [m], heel [m], and the direction in which it cuts.
+    """
+    tx, ty, tz, hx, hy, hz, fx, fy, fz = edge
+    return quaternion_of(_axes((tx - hx, ty - hy, tz - hz), (fx, fy, fz)))
 
 
 @kernel

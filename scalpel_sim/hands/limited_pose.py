@@ -43,12 +43,21 @@ class LimitedPose:
 
     It starts at rest.
 
+    Attributes:
+        most_speed: Highest speed of its middle [m/s].
+        most_turn_rate: Highest rate at which it turns [rad/s].
+        farthest_ahead: Lead of the wanted place over it, at most [m].
+        most_ahead_turn: Lead of the wanted rotation over it, at most [rad].
+
     Args:
         middle: Where the middle of the instrument is [m], shape (3,).
         rotation: How it is turned (w, x, y, z).
         workspace: Lowest and highest place of its middle [m], shape (2, 3).
         dt: Length of a frame [s].
     """
+
+    most_speed, most_turn_rate = MOST_SPEED, MOST_TURN_RATE
+    farthest_ahead, most_ahead_turn = FARTHEST_AHEAD, MOST_AHEAD_TURN
 
     def __init__(
         self, middle: FloatArray, rotation: FloatArray, workspace: FloatArray, dt: float
@@ -71,7 +80,7 @@ class LimitedPose:
         self._way.clear()
         requested = self.wanted + by
         ahead = np.clip(requested, *self.workspace) - self.middle
-        self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
+        self.wanted[:] = self.middle + _shortened(ahead, self.farthest_ahead)
         self._is_limited |= math.dist(requested.tolist(), self.wanted.tolist()) > ARRIVED
 
     def aim(self, to: FloatArray) -> None:
@@ -91,9 +100,9 @@ class LimitedPose:
         mujoco.mju_mulQuat(turned, turn, self.wanted_rotation)
         ahead = np.empty(3)
         mujoco.mju_subQuat(ahead, turned, self.rotation)
-        self._is_limited |= math.hypot(*ahead.tolist()) > MOST_AHEAD_TURN
+        self._is_limited |= math.hypot(*ahead.tolist()) > self.most_ahead_turn
         self.wanted_rotation[:] = self.rotation
-        mujoco.mju_quatIntegrate(self.wanted_rotation, _shortened(ahead, MOST_AHEAD_TURN), 1.0)
+        mujoco.mju_quatIntegrate(self.wanted_rotation, _shortened(ahead, self.most_ahead_turn), 1.0)
 
     def want(self, middle: FloatArray, rotation: FloatArray) -> None:
         """Want it at a pose, however far ahead, as near as the room allows.
@@ -128,11 +137,11 @@ class LimitedPose:
         distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
         share = self.share()
         if distance > ARRIVED:
-            most = MOST_SPEED * self.dt / distance
+            most = self.most_speed * self.dt / distance
             self._is_limited |= most < share
             self.middle += way * min(share, most)
         if angle > ARRIVED_TURN:
-            most = MOST_TURN_RATE * self.dt / angle
+            most = self.most_turn_rate * self.dt / angle
             self._is_limited |= most < share
             mujoco.mju_quatIntegrate(self.rotation, turn, min(share, most))
             mujoco.mju_normalize4(self.rotation)

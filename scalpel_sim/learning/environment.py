@@ -179,7 +179,7 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         episode = self.episode
         info: dict[str, Any] = {
             "is_success": episode.is_success,
-            "score": episode.score.terms(),
+            "score": episode.terms,
         }
         if outcome is None:
             info["variation"] = dict(episode.drawn)

@@ -2,11 +2,11 @@
 
 import math
 
-import mujoco
 import numpy as np
 
+from scalpel_sim.arm.hand import edge_rotation
+from scalpel_sim.quaternions import matrix_of
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.stroke import poses_of_edges
 from tissue import FloatArray
 
 
@@ -30,11 +30,9 @@ class FeltWrench:
     def add(self) -> None:
         """Add the last frame."""
         simulation = self._simulation
-        frame, result = simulation.frame, simulation.bridge.result
-        edge, axes = frame.segment_to_tissue(simulation.blade.segment), np.empty(9)
-        _, rotations, _ = poses_of_edges(edge.tip[None], edge.heel[None], edge.forward[None])
-        mujoco.mju_quat2Mat(axes, rotations[0])
-        to_tool = axes.reshape(3, 3).T @ frame.rotation.T
+        result = simulation.bridge.result
+        axes = np.array(matrix_of(edge_rotation(simulation.blade.segment.numbers)))
+        to_tool = axes.reshape(3, 3).T
         numbers = np.array(simulation.blade.wrench.numbers[:6]).reshape(2, 3)
         self._total += np.concatenate([to_tool @ each for each in numbers])
         self._n_frames += 1

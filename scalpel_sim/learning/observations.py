@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from bridge import InProcessLink
+from scalpel_sim.arm.hand import edge_rotation
 from scalpel_sim.instruments.driven_grasper import DrivenGrasper
 from scalpel_sim.recording.observations import farthest_points
 from scalpel_sim.scene.arm_tables import BLADE_NAME
@@ -16,7 +17,6 @@ from scalpel_sim.scene.observe_table import POINTS_KEY, SensorTable
 from scalpel_sim.scoring.plan import Plan
 from scalpel_sim.scoring.score import Score
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.stroke import poses_of_edges
 from tissue import FloatArray, IntArray
 
 N_STATIONS = 16
@@ -198,6 +198,7 @@ class Observer:
             "target": self._target,
             "depth": self._depth,
         }
+        self._bounds = {key: (each.low, each.high) for key, each in self.shapes().items()}
         self._plan: PlanView | None = None
         self._sensor: Sensor | None = None
         self._rows: FloatArray | None = None
@@ -216,7 +217,7 @@ class Observer:
         self._sensor = sensor
         self.force, self.peak = np.zeros(6), 0.0
         self._shown_force = sensor.read(self.force)
-        self._last = self._edge()
+        self._last = self._now = self._edge()
 
     def state(self) -> dict[str, Any]:
         """Return what the next observation depends on besides the simulation, as JSON has it."""
@@ -278,13 +279,11 @@ class Observer:
 
     def now(self) -> dict[str, FloatArray]:
         """Return the arrays by name, as things are; see `after_step`."""
-        self._rows = None
+        self._rows, self._now = None, self._edge()
         found = {key: self._made(key) for key in self.keys}
-        self._last = self._edge()
-        shapes = self.shapes()
+        self._last = self._now
         return {
-            key: np.clip(each, shapes[key].low, shapes[key].high).astype(np.float32)
-            for key, each in found.items()
+            key: np.clip(each, *self._bounds[key]).astype(np.float32) for key, each in found.items()
         }
 
     def _made(self, key: str) -> FloatArray:
@@ -298,11 +297,10 @@ class Observer:
     def _edge(self) -> tuple[FloatArray, FloatArray]:
         """Return the tip [m] and the rotation of the blade (w, x, y, z), tissue frame."""
         edge = self._simulation.frame.segment_to_tissue(self._simulation.blade.segment)
-        _, rotations, _ = poses_of_edges(edge.tip[None], edge.heel[None], edge.forward[None])
-        return edge.tip, _canonical(rotations[0])
+        return edge.tip, _canonical(np.array(edge_rotation(edge.numbers)))
 
     def _blade(self) -> FloatArray:
-        (before, turned_before), (tip, rotation) = self._last, self._edge()
+        (before, turned_before), (tip, rotation) = self._last, self._now
         turn = _turn_between(turned_before, rotation)
         return np.concatenate([tip, rotation, (tip - before) / self._step, turn / self._step])
 
@@ -323,7 +321,7 @@ class Observer:
     def _depth(self) -> FloatArray:
         if self._plan is None:
             return np.zeros(2)
-        return self._plan.depth(self._target_rows(), self._edge()[0])
+        return self._plan.depth(self._target_rows(), self._now[0])
 
     def _grasper(self, grasper: DrivenGrasper) -> FloatArray:
         frame, pads = self._simulation.frame, grasper.grasper.pads

@@ -30,13 +30,16 @@ class Payment:
         self._potential = self._weighted()
         self.is_success = False
         """Whether all conditions of success held after the last control step."""
+        self.failed: list[str] = []
+        """Conditions that did not hold then."""
         self._is_paid = False
 
     def after_step(self) -> float:
         """Return the reward of a control step that was done. Success is paid once."""
         now = self._weighted()
         reward, self._potential = now - self._potential, now
-        self.is_success = self._score.asks and not self._score.failed()
+        self.failed = self._score.failed(self.terms) or []
+        self.is_success = self._score.asks and not self.failed
         if self.is_success and not self._is_paid:
             reward += self._success
             self._is_paid = True
@@ -58,11 +61,16 @@ class Payment:
         self._is_paid = state["is_paid"]
         if self._guide is not None:
             self._guide.holders[:] = state["guide"]
+        self.terms = self._score.terms()
 
     def _weighted(self) -> float:
         """Return the weighted sum of the terms now."""
-        simulation, terms = self._simulation, self._score.terms()
+        simulation = self._simulation
+        self.terms = self._score.terms()
+        """Terms of the score after the last control step, by name."""
+        terms = self.terms
         if self._guide is not None:
+            terms = dict(terms)
             tip = simulation.frame.segment_to_tissue(simulation.blade.segment).tip
             terms["approach"] = self._guide.way(tip, self._score.is_covered)
         return sum(weight * terms.get(name, 0.0) for name, weight in self._weights.items())

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from scalpel_sim.hands.driven_instruments import LiveInstrument
-from scalpel_sim.hands.limited_pose import MOST_SPEED, LimitedPose
+from scalpel_sim.hands.limited_pose import LimitedPose
 from scalpel_sim.hands.teleoperation import Teleoperation
 from scalpel_sim.instruments.driven_grasper import MotionFollower
 from scalpel_sim.scene.act_table import ActTable
@@ -25,6 +25,8 @@ JAWS = "jaws"
 class EvenPose(LimitedPose):
     """A pose that arrives where it is wanted after a number of frames, at an even speed."""
 
+    most_speed = most_turn_rate = farthest_ahead = math.inf  # an action has limits of its own
+    most_ahead_turn = math.pi
     n_frames = 1
     """Frames that are left until it is to arrive."""
 
@@ -138,7 +140,7 @@ class PolicyHand(Teleoperation):
         for name, by in starts.items():
             pose, way = self._instruments[name].pose, float(np.linalg.norm(by))
             assert isinstance(pose, EvenPose)
-            of_this = 1 + math.ceil(way / (min(self._act.speed, MOST_SPEED) * self._act.step))
+            of_this = 1 + math.ceil(way / (self._act.speed * self._act.step))
             pose.n_frames = of_this * self._n_frames
             pose.move(by)
             n = max(n, of_this)

@@ -84,5 +84,5 @@ def run_episode(
         episode.n_steps,
         outcome.failed,
         outcome.fault,
-        episode.score.terms(),
+        episode.terms,
     )

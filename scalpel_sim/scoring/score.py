@@ -160,12 +160,15 @@ class Score:
                 found[f"{each.name}_dropped"] = float(each.dropped)
         return {name: value for name, value in found.items() if value is not None}
 
-    def failed(self) -> list[str] | None:
+    def failed(self, terms: Mapping[str, float] | None = None) -> list[str] | None:
         """Return the conditions of success that do not hold now; None where there are none.
 
         A term that is not known does not hold.
+
+        Args:
+            terms: What `terms` returned; None: as it does now.
         """
-        task, terms = self._yardstick.task, self.terms()
+        task, terms = self._yardstick.task, self.terms() if terms is None else terms
         asked = _asked(task.success)
         if not asked and task.seconds is None:
             return None

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from scalpel_sim import SCENES
 from scalpel_sim.errors import UsageError
 from scalpel_sim.learning import Episode, Expert
+from scalpel_sim.scene.act_table import ActTable
 from tests.scalpel_sim.learning.little_task import little_task
 
 __all__ = ["little_task"]
@@ -152,3 +154,17 @@ def test_a_wrong_action_and_a_scene_without_a_task_are_refused(episode):
             episode.act(wrong)
     with pytest.raises(UsageError, match=r"'slab' has no \[task\]"):
         Episode(SCENES["slab"])
+
+
+def test_limits_are_those_of_the_table_however_large(little_task, caplog):
+    fast = Episode(structs.replace(little_task, act=ActTable(speed=0.3, turn=8.0, step=0.05)))
+    begin(fast)
+    pose = fast.hand.blade.pose
+    before, rotation = pose.middle.copy(), pose.rotation.copy()
+    action = np.zeros(len(fast.action_names))
+    action[1], action[5], action[-1] = -1.0, 1.0, -1.0
+    fast.act(action)
+    assert np.linalg.norm(pose.middle - before) == pytest.approx(0.3 * 0.05)
+    assert 2.0 * np.arccos(abs(rotation @ pose.rotation)) == pytest.approx(8.0 * 0.05)
+    fast.act(action)  # the jaws close on nothing, which only a person is told
+    assert not caplog.records
