@@ -265,7 +265,6 @@ class Episode:
         self.rng, self.drawn = rng, dict(content["variation"])
         self.simulation.reset()
         self._variation.apply(self.drawn)  # the plan is none of what its state has
-        self._rest()  # a state is written over the results of the last frame, not of the start
         self.simulation.load_state(state.simulation)
         self.n_steps, self.fault = content["n_steps"], None
         self.hand.return_to(content["hand"])

@@ -149,3 +149,17 @@ def test_a_state_of_another_simulation_is_refused():
     one, other = (prepare(SCENES["slab"]) for _ in range(2))
     with pytest.raises(StateError, match="another simulation"):
         other.load_state(one.save_state())
+
+
+def test_bytes_that_are_loaded_change_nothing_of_the_start():
+    simulation = prepare(SLAB, records=False)
+    simulation.run(0.002)
+    simulation.note_start()
+    start = simulation.blade.segment.numbers, simulation.wrench.numbers
+    simulation.run(0.4)
+    later = SimulationState.from_bytes(simulation.save_state().to_bytes())
+    simulation.reset()
+    simulation.load_state(later)
+    assert simulation.blade.segment.numbers != start[0]
+    simulation.reset()
+    assert (simulation.blade.segment.numbers, simulation.wrench.numbers) == start

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tissue.core.lazy_fields import plain_class
+from tissue.core.lazy_fields import keeps_views, plain_class
 from tissue.core.memento import Memento, StateRules, attributes_in, derived_in, nested_structs
 from tissue.core.memory_blocks import PackedMemory, memory_of, unpacked
 from tissue.core.structs import Arrays, Vectors
@@ -288,7 +288,10 @@ class _Reader:
 
     def _make_tuple(self, number: int, node: dict[str, Any], live: Any) -> None:
         name = node["tuple"]
-        now = list(live) if isinstance(live, tuple) else []
+        now: list[Any] = []
+        if isinstance(live, tuple):
+            # What a tuple has made of its own numbers belongs to it: a memento may hold that tuple.
+            now = list(live if keeps_views(live) else tuple.__iter__(live))
         items = self._items(node["items"], now, are_in_tuple=True)
         if name == name_of_tuple(tuple):
             self._made[number] = tuple(items)
