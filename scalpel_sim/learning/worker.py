@@ -162,7 +162,7 @@ class Worker:
 
 
 def work(connection: Connection, job: Job) -> None:
-    """Do what is told until the other end of the connection is closed, or its process has ended.
+    """Serve until the other end of the connection is closed, or its process has ended.
 
     Each answer is whether it was done, and what came of it, or the error.
     """
@@ -172,7 +172,7 @@ def work(connection: Connection, job: Job) -> None:
 
 
 def _serve(connection: Connection, job: Job) -> None:
-    """Do what is told until something fails.
+    """Serve until something fails.
 
     Raises:
         EOFError: the other end was closed.

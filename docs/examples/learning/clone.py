@@ -86,7 +86,7 @@ class Policy(nn.Module):
 
 
 class Shown:
-    """What was shown at each step, and what the expert did there."""
+    """Observations of each step, and the actions of the expert there."""
 
     def __init__(self, obs: str) -> None:
         self.obs = obs

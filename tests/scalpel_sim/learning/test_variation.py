@@ -1,4 +1,4 @@
-"""What differs from episode to episode: drawn by a seed, and gone with the next reset."""
+"""Variations of episodes are drawn by a seed, and gone with the next reset."""
 
 import logging
 
