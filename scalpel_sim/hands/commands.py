@@ -31,10 +31,10 @@ LATEST_STAMP = 1e12
 """Largest stamp [ms]: some thirty years."""
 
 LONGEST_SILENCE = 2.0
-"""Wall time without a message after which an engaged hand releases [s]. The page says ten times a
-second that it is there, but where drawing takes all of the machine, its thread hangs for a second.
-Until then the blade goes no farther than was requested, and a page that is closed releases at
-once."""
+"""Wall time without a message after which an engaged hand rests, until it hears one again [s]. The
+page says ten times a second that it is there, but where drawing takes all of the machine, its
+thread hangs for a second. Until then the blade goes no farther than was requested, and a page that
+is closed releases at once."""
 
 HIGHEST_TOUGHNESS, THICKEST_BLADE = 1e4, 2e-3
 """Highest fracture toughness [J/m2] and thickest blade [m] that a page may request: beyond those of
@@ -86,7 +86,7 @@ class Turn(_Message, frozen=True, tag="turn"):
 
 
 class StillThere(_Message, frozen=True, tag="still there"):
-    """The page is still there, and its hand has nothing new to say."""
+    """The page is still there, holds the instrument, and its hand has nothing new to say."""
 
 
 class Lead(_Message, frozen=True, tag="lead"):

@@ -142,21 +142,34 @@ class Teleoperation(abc.ABC):
 
 
 class LiveHand(Teleoperation):
-    """A hand that obeys the commands of a page; see `Teleoperation`."""
+    """A hand that obeys the commands of a page; see `Teleoperation`.
+
+    After `LONGEST_SILENCE` of the page it rests, and the next command continues its stroke.
+    """
+
+    _rests_in_silence = False
 
     def _obey(self) -> bool:
         """Obey the commands; return whether one of them ends the run."""
         while self.commands:
             command = self.commands.popleft()
             self._heard_at = self._clock()
+            if self._rests_in_silence:
+                self.engage()
             HAND_COMMANDS[type(command)](self, command)
         if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
             self.release()
+            self._rests_in_silence = True
         return self.is_to_end
+
+    def release(self) -> None:
+        """See `Teleoperation.release`."""
+        super().release()
+        self._rests_in_silence = False
 
     def engage(self) -> None:
         """Lead the chosen instrument from now on."""
-        self.is_engaged = True
+        self.is_engaged, self._rests_in_silence = True, False
 
     def move(self, command: Move | Turn) -> None:
         """Move or turn the chosen instrument, if it is engaged."""

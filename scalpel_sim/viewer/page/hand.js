@@ -2,7 +2,6 @@
 "use strict";
 
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
-const SILENT_AFTER = 1600; // silence after which the run may have released [ms]
 const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
 const LONGEST_STEP = 10000; // and at most, where no picture shows that it moves
 const N_LAGS_SHOWN = 30; // of which the median is shown
@@ -72,12 +71,10 @@ class Hand {
         this.showControls();
     }
 
-    // After a silence the run has released, or will: then the page engages again.
+    // After a silence the run has released; then it engages again.
     sayAlive() {
         this.letGoOfSteps();
-        if (!this.isEngaged) return;
-        const wasSilent = performance.now() - this.run.sentAt > SILENT_AFTER;
-        this.run.say({ type: wasSilent ? "engage" : "still there" });
+        if (this.isEngaged) this.run.say({ type: "still there" });
     }
 
     // Hold the blade until `letGo`; or, for a step, until a picture shows that it is done.
@@ -156,7 +153,6 @@ class Hand {
 
     lead(message) {
         if (!this.isEngaged || !this.isClosed) return;
-        if (performance.now() - this.run.sentAt > SILENT_AFTER) this.sayAlive();
         this.run.say(message);
         this.unshown.push(message.stamp);
         if (!this.hasMoved) {

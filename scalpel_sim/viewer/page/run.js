@@ -16,7 +16,6 @@ class Run {
         this.socket = null;
         this.leads = false;
         this.state = null; // in the last picture: see RunState
-        this.sentAt = 0; // when something was said last [ms]
         this.next = null; // what the next run is to be
         this.drawing = null;
         this.isDrawing = false; // whether a press draws a line: see draw.js
@@ -54,7 +53,6 @@ class Run {
     say(message) {
         if (this.socket === null || this.socket.readyState !== WebSocket.OPEN) return;
         this.socket.send(JSON.stringify(message));
-        this.sentAt = performance.now();
     }
 
     // What does not go together with a blade that is held.

@@ -9,7 +9,7 @@ from tornado.websocket import websocket_connect
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.runs.file_names import SCENE
-from tests.support.processes import PROGRAM, environment
+from tests.support.processes import PROGRAM, environment, free_port
 from tests.support.run_files import assert_same_run
 
 
@@ -54,10 +54,14 @@ class DeviceRunProcess(ProcessOfARun):
 
 
 class LiveView(ProcessOfARun):
-    """A `scalpel-sim view`."""
+    """A `scalpel-sim view`.
+
+    Its port is none that another view of these tests had: a page of that one may be open, waits
+    there for the next run, and would lead it.
+    """
 
     def __init__(self, scene, folder, *options):
-        super().__init__(folder, "view", scene, *options)
+        super().__init__(folder, "view", scene, "--port", str(free_port()), *options)
         self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("http://")).group()
 
     def wait_for_files(self):

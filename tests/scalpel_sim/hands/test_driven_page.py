@@ -27,6 +27,11 @@ HOLD_STICK = """([x, y, isPressed]) => {
     navigator.getGamepads = () => [pad, null, null, null];
 }"""
 
+HANG = """(ms) => {
+    const end = performance.now() + ms;
+    while (performance.now() < end);
+}"""
+
 LAID_BARE = """() => {
     const { x, y, width, height } = viewer.renderer.domElement.getBoundingClientRect();
     return [x + 0.5 * width, y + 0.45 * height];
@@ -37,7 +42,7 @@ LAID_BARE = """() => {
 def view(tmp_path, request, browser):
     with DrivenView(request.param, tmp_path / "led") as led:
         yield led
-    for context in browser.contexts:  # a page that is left open would lead the next run
+    for context in browser.contexts:
         context.close()
 
 
@@ -50,8 +55,10 @@ def opened(browser, view, leads=True):
     return tab
 
 
-def drag(tab, right, down, button="left", key=None):
+def drag(tab, right, down, button="left", key=None, hangs=0.0):
     """Drag by so many pixels, without haste, while a key is pressed.
+
+    Half-way the page hangs for so many seconds.
 
     Let go once the picture shows all that was asked: on a busy machine the tissue is behind, and a
     blade that is let go stops where it is.
@@ -64,6 +71,8 @@ def drag(tab, right, down, button="left", key=None):
     for i in range(1, STEPS_OF_DRAG + 1):
         tab.mouse.move(x + right * i / STEPS_OF_DRAG, y + down * i / STEPS_OF_DRAG)
         time.sleep(PAUSE)
+        if hangs and i == STEPS_OF_DRAG // 2:
+            tab.evaluate(HANG, 1e3 * hangs)
     until_the_tip_rests(tab)
     tab.mouse.up(button=button)
     if key is not None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scalpel_sim.hands.commands import LONGEST_SILENCE
 from scalpel_sim.runs.file_names import REPLAY, REPORT, SUMMARY
 from tests.scalpel_sim.hands.driven_view import DrivenView, LiveView
 from tests.scalpel_sim.hands.test_driven_page import drag, tip, until_it_rests
@@ -28,7 +29,7 @@ def scripted(tmp_path, browser):
         tab.goto(view.url)
         tab.wait_for_function("run.leads && run.state !== null")
         yield tab
-        tab.close()  # it would lead the next run at this port
+        tab.close()
         assert tab.failures == []
 
 
@@ -131,7 +132,7 @@ def test_a_reset_takes_a_scripted_run_back_to_its_start(scripted):
 
 
 @pytest.mark.browser
-def test_a_stroke_is_undone_in_the_page(tmp_path, browser):
+def test_a_stroke_in_which_the_page_hangs_is_one_and_is_undone_in_the_page(tmp_path, browser):
     with DrivenView("grid2", tmp_path / "led") as view:
         tab = new_tab(browser)
         tab.goto(view.url)
@@ -140,9 +141,10 @@ def test_a_stroke_is_undone_in_the_page(tmp_path, browser):
         drag(tab, 60, 0)
         until_it_rests(tab)
         between = tip(tab)
-        drag(tab, 0, 60)
+        drag(tab, 0, 60, hangs=1.5 * LONGEST_SILENCE)
         until_it_rests(tab)
         assert not np.allclose(tip(tab), between, atol=1e-4)
+        assert tab.evaluate("run.state.strokes") == 2
         tab.keyboard.press("Control+z")
         tab.wait_for_function("run.state.strokes === 1")
         assert np.allclose(tip(tab), between, atol=1e-4)

@@ -148,6 +148,21 @@ def test_a_hand_that_hears_nothing_stops_where_it_is(hand):
     assert not hand.is_engaged
 
 
+def test_a_hand_that_hears_its_page_again_continues_unless_it_was_released(hand):
+    hand.commands.append(Engage())
+    poses(hand, 1)
+    for last, goes_on in [(StillThere(), True), (move(y=0.01), True), (Release(), False)]:
+        hand._clock.now += LONGEST_SILENCE + 0.01
+        poses(hand, 1, 1)
+        assert not hand.is_engaged
+        hand.commands.append(last)
+        poses(hand, 1, 2)
+        assert hand.is_engaged == goes_on
+    hand.commands.append(StillThere())
+    poses(hand, 1, 3)
+    assert not hand.is_engaged
+
+
 def test_a_page_that_says_that_it_is_there_keeps_the_hand_engaged(hand):
     hand.commands.append(Engage())
     for k in range(20):
