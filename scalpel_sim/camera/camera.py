@@ -1,6 +1,7 @@
 """A camera of a simulation, or of a model and tissue of your own."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple, Self
 
@@ -14,7 +15,7 @@ from scalpel_sim.camera.identities import Identities
 from scalpel_sim.camera.lenses import pixels_through, sight_through
 from scalpel_sim.camera.lights import WALL_COLOUR, Light, usual_lights
 from scalpel_sim.camera.theatre import Theatre, theatre_of
-from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes
+from scalpel_sim.camera.tissue_parts import TissueParts, part_finishes, part_names
 from scalpel_sim.camera.viewpoints import (
     Viewpoint,
     camera_names,
@@ -24,14 +25,17 @@ from scalpel_sim.camera.viewpoints import (
     usual_camera,
     viewpoint_of,
 )
-from scalpel_sim.errors import UsageError
+from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.looks import look_of
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from tissue import FloatArray, IntArray
+from tissue.support import labels_of_part
 
 _MOST_PIXELS = 8192
 """Longest side of an image [pixels]."""
+
+_NO_TINTS: Mapping[str, Sequence[float]] = MappingProxyType({})
 
 
 class CameraImage(NamedTuple):
@@ -130,11 +134,66 @@ class Camera:
         self.name = name
         """Name of the camera."""
         self._size = size
-        self._view = self._stage.view(name)
+        self._view = self._usual_view = self._stage.view(name)
+        self._has_own_lights = lights is not None
         self.lights: Sequence[Light] | None = lights
         """Lamps of the next image; None: those of the model, and one at the eye."""
-        if lights is None and isinstance(self._view, Viewpoint):
-            self.lights = usual_lights(name, self._view)
+        self._put_lights()
+
+    def _put_lights(self) -> None:
+        """Put the usual lamps where the camera is, unless it has others."""
+        if isinstance(self._view, Viewpoint) and not self._has_own_lights:
+            self.lights = usual_lights(self.name, self._view)
+
+    def move_eye(self, by: Sequence[float] | FloatArray) -> None:
+        """Put the eye elsewhere; it looks at the same point, and its usual lamps move with it.
+
+        Args:
+            by: Displacement from where it was at first [m], world frame, shape (3,).
+
+        Raises:
+            UsageError: it is a camera of the model.
+        """
+        if not isinstance(self._usual_view, Viewpoint):
+            raise UsageError(
+                f"the camera '{self.name}' is one of the model, and stays where the model has it; "
+                "a [[view]] can be put elsewhere"
+            )
+        eye = self._usual_view.eye + np.asarray(by, np.float64)
+        self._view = replace(self._usual_view, eye=eye)
+        self._put_lights()
+
+    def parts_of(self, label: str | None = None) -> list[str]:
+        """Return the names, as `ids` has them, of the skin and the cut faces of a part of the body.
+
+        Args:
+            label: Name of the part; None: all of the body.
+
+        Raises:
+            UsageError: the body has no such part.
+        """
+        return self._stage.parts_of(label)
+
+    def change_look(
+        self, brightness: float = 1.0, tints: Mapping[str, Sequence[float]] = _NO_TINTS
+    ) -> None:
+        """Change lamps and colours of all cameras that come of one another.
+
+        Args:
+            brightness: Factor of the light of all lamps.
+            tints: Factors of red, green and blue (sRGB) by the name of a part of the body, as
+                `ids` has it; those that are not named are as usual.
+
+        Raises:
+            UsageError: the body has no such part.
+        """
+        canvas, parts = self._stage.canvas, self.parts_of()
+        for name in tints:
+            if name not in parts:
+                raise unknown("part of the body", name, parts)
+        canvas.brightness = brightness
+        for name in parts:
+            canvas.tint(name, tints.get(name, (1.0, 1.0, 1.0)))
 
     @property
     def width(self) -> int:
@@ -287,6 +346,18 @@ class _Stage:
         if self._link is not None:
             points = theatre.frame.points_to_world(self._link.surface().positions)
             self.canvas.aim_lamps(points)
+
+    def parts_of(self, label: str | None) -> list[str]:
+        """See `Camera.parts_of`."""
+        if self._link is None:
+            return []
+        titles = self.theatre.labels()
+        names = part_names(titles)
+        if label is None:
+            return list(names.values())
+        known = dict(self._link.describe().labels)
+        numbers = labels_of_part(list(titles), known, label)
+        return [name for key, name in names.items() if key.label in numbers]
 
     def view(self, name: str) -> Viewpoint | int:
         """Return the place of a camera; or its number, of one of the model.

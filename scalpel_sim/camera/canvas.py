@@ -75,6 +75,8 @@ class Canvas:
         self.option = mujoco.MjvOption()
         """MuJoCo's options of what is drawn of the model. Sites are left out."""
         self.option.sitegroup[:] = 0
+        self.brightness = 1.0
+        """Factor of the light of all lamps."""
         self.middle, self.extent = np.zeros(3), 1.0
         """Middle and size of what lamps that are far away shadow [m], world frame."""
         self._gl: Any = None
@@ -107,6 +109,15 @@ class Canvas:
         """
         self._composition.replace_geom(geom, name, mesh)
 
+    def tint(self, name: str, factor: Sequence[float]) -> None:
+        """Multiply the colour of a mesh, as its finish has it.
+
+        Args:
+            name: One of the names of the finishes.
+            factor: Factors of red, green and blue (sRGB); none becomes more than 1.
+        """
+        self._composition.tint(name, factor)
+
     def aim_lamps(self, points: FloatArray) -> None:
         """Choose what lamps that are far away shadow: points of it [m], world frame, (n, 3)."""
         self.middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -138,6 +149,10 @@ class Canvas:
             for light, into in zip(lights, composition.scene.lights, strict=False):
                 reach = _REACH * self.extent
                 put_light(light, into, middle=self.middle, reach=reach)
+        if self.brightness != 1.0:
+            for light in composition.scene.lights[: composition.scene.nlight]:
+                for part in (light.diffuse, light.specular, light.ambient):
+                    part *= self.brightness
 
     def colours(self, size: PixelSize) -> np.ndarray:
         """Return what was seen, red, green and blue as bytes, shape (height, width, 3)."""

@@ -1,6 +1,6 @@
 """The scene that is drawn: a model in MuJoCo, and triangle meshes in it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -99,6 +99,12 @@ class Composition:
     def replace_geom(self, geom: int, name: str, mesh: TriangleMesh) -> None:
         """Show a mesh in place of a geom of the model; see `Canvas.replace_geom`."""
         self._instead[geom], self._shapes[name] = name, mesh
+
+    def tint(self, name: str, factor: Sequence[float]) -> None:
+        """Multiply the colour of a mesh; see `Canvas.tint`."""
+        *colour, opacity = self._finishes[name].colour
+        tinted = np.minimum(np.multiply(colour, factor), 1.0)
+        self._colours[name][:] = (*tinted, opacity)
 
     def with_room(self) -> RenderModel:
         """Return the second model, with room for all meshes as they are.

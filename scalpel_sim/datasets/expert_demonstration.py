@@ -13,14 +13,15 @@ from scalpel_sim.datasets.hand_poses import poses_of_hands
 from scalpel_sim.datasets.taking import (
     DatasetRequest,
     ShowProgress,
-    cameras_of,
     layout_of,
+    open_cameras,
     seen_now,
     unseen_progress,
 )
 from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.learning.episode import Episode
 from scalpel_sim.learning.expert import Expert
+from scalpel_sim.learning.look_variation import LookVariation
 from scalpel_sim.learning.rollout import LONGEST_EPISODE
 from scalpel_sim.runs.file_names import SCENE
 from scalpel_sim.scene.act_table import ActTable, hands_led
@@ -109,7 +110,7 @@ class ExpertDemonstration:
             UsageError: no camera has such a name.
         """
         episode = self._of.episode
-        with cameras_of(episode.simulation, self.cameras):
+        with open_cameras(episode.simulation, self.cameras):
             return layout_of(episode.simulation, episode.shapes, self)
 
     def transitions(self) -> Iterator[Transition]:
@@ -125,9 +126,10 @@ class ExpertDemonstration:
         self._variation = dict(episode.drawn)
         expert = Expert(episode)
         with (
-            cameras_of(simulation, self.cameras) as cameras,
+            open_cameras(simulation, self.cameras) as cameras,
             self._of.progress(most * simulation.dt * episode.hand.n_frames) as after_step,
         ):
+            LookVariation(self._of.scene, simulation.frame).apply(cameras, episode.drawn)
             before = seen_now(simulation, episode.observation, poses_of_hands(simulation), cameras)
             is_done = False
             while not is_done:

@@ -13,8 +13,8 @@ from scalpel_sim.datasets.recorded_runs import RecordedRun
 from scalpel_sim.datasets.taking import (
     DatasetRequest,
     ShowProgress,
-    cameras_of,
     layout_of,
+    open_cameras,
     seen_now,
     unseen_progress,
 )
@@ -96,7 +96,7 @@ class RepeatedRun:
         """
         simulation = _prepared(self.run)
         observer = Observer(simulation, self.keys, 1.0 / self.fps)
-        with cameras_of(simulation, self.cameras):
+        with open_cameras(simulation, self.cameras):
             return layout_of(simulation, observer.shapes(), self)
 
     def transitions(self) -> Iterator[Transition]:
@@ -116,7 +116,7 @@ class RepeatedRun:
                 f"{n_frames}; a demonstration has one step at least"
             )
         with (
-            cameras_of(simulation, self.cameras) as cameras,
+            open_cameras(simulation, self.cameras) as cameras,
             self._progress(n_steps / self.fps) as after_frame,
             no_garbage_collection(),
         ):

@@ -15,6 +15,7 @@ from scalpel_sim.datasets.demonstration import (
 )
 from scalpel_sim.datasets.hand_poses import HandPose, action_names
 from scalpel_sim.errors import UsageError
+from scalpel_sim.learning.images import cameras_of
 from scalpel_sim.learning.observations import Shown
 from scalpel_sim.scene.arm_tables import BLADE_NAME
 from scalpel_sim.scene.observe_table import CameraTable
@@ -83,21 +84,16 @@ def unseen_progress(seconds: float) -> AbstractContextManager[AfterFrame]:
 
 
 @contextmanager
-def cameras_of(simulation: Simulation, rows: Sequence[CameraTable]) -> Iterator[dict[str, Camera]]:
+def open_cameras(
+    simulation: Simulation, rows: Sequence[CameraTable]
+) -> Iterator[dict[str, Camera]]:
     """Yield cameras of a simulation by name, and close them.
 
     Raises:
         UsageError: no camera has such a name.
     """
-    found: dict[str, Camera] = {}
+    found = cameras_of(simulation, rows)
     try:
-        for row in rows:
-            width, height = row.size
-            if found:
-                camera = next(iter(found.values())).another(row.name, width=width, height=height)
-            else:
-                camera = Camera(simulation, row.name, width=width, height=height)
-            found[row.name] = camera
         yield found
     finally:
         if found:

@@ -141,6 +141,8 @@ class TissueEnv(gymnasium.Env[Any, Any]):
             self.np_random = self.episode.rng
         else:
             self.episode.load_state(EpisodeState.from_bytes(state), self.np_random)
+        if self._images is not None:
+            self._images.begin()
         if self.render_mode == HUMAN:
             self._live_page()
         return self._observed(), self._info(None)

@@ -1,6 +1,6 @@
 """Images that a policy is shown, at each control step."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,7 +8,9 @@ import numpy as np
 from scalpel_sim.camera.camera import Camera
 from scalpel_sim.errors import UsageError
 from scalpel_sim.learning.episode import Episode
+from scalpel_sim.learning.look_variation import LookVariation
 from scalpel_sim.scene.observe_table import CameraTable, ObserveTable
+from scalpel_sim.simulation import Simulation
 
 FARTHEST_SEEN = 10.0
 """Depth that is shown at most [m]: that of what has nothing behind it."""
@@ -48,6 +50,7 @@ class ImageTaker:
                 'cameras = [{ name = "endoscope" }]'
             )
         self._episode = episode
+        self._look = LookVariation(scene, episode.simulation.frame)
         self._cameras: dict[str, Camera] = {}
 
     @property
@@ -66,28 +69,52 @@ class ImageTaker:
                 found[f"{row.name}_segmentation"] = shape
         return found
 
+    def begin(self) -> None:
+        """Begin an episode: cameras, light and colours are as its `[[vary]]` has them.
+
+        The cameras are made in the process that takes their first image.
+
+        Raises:
+            UsageError: no camera has such a name, or one is to be elsewhere that cannot.
+        """
+        if not self._cameras:
+            self._cameras = cameras_of(self._episode.simulation, self._rows)
+        self._look.apply(self._cameras, self._episode.drawn)
+
     def take(self) -> dict[str, np.ndarray]:
         """Return the images of this instant, by name."""
         found: dict[str, np.ndarray] = {}
         for row in self._rows:
-            found |= _taken(row, self._camera(row))
+            found |= _taken(row, self._cameras[row.name])
         return found
-
-    def _camera(self, row: CameraTable) -> Camera:
-        """Return a camera; it is made in the process that takes its first image."""
-        if row.name not in self._cameras:
-            width, height = row.size
-            first = next(iter(self._cameras.values()), None)
-            make: Callable[..., Camera] = Camera if first is None else first.another
-            given = (self._episode.simulation,) if first is None else ()
-            self._cameras[row.name] = make(*given, row.name, width=width, height=height)
-        return self._cameras[row.name]
 
     def close(self) -> None:
         """Free what OpenGL holds."""
         for camera in self._cameras.values():
             camera.close()
         self._cameras.clear()
+
+
+def cameras_of(simulation: Simulation, rows: Sequence[CameraTable]) -> dict[str, Camera]:
+    """Return cameras of a simulation by name, which come of one another.
+
+    Args:
+        simulation: The simulation.
+        rows: Their names and sizes.
+
+    Raises:
+        UsageError: no camera has such a name.
+    """
+    found: dict[str, Camera] = {}
+    for row in rows:
+        width, height = row.size
+        first = next(iter(found.values()), None)
+        found[row.name] = (
+            Camera(simulation, row.name, width=width, height=height)
+            if first is None
+            else first.another(row.name, width=width, height=height)
+        )
+    return found
 
 
 def _taken(row: CameraTable, camera: Camera) -> dict[str, np.ndarray]:

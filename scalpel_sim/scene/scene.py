@@ -141,7 +141,9 @@ class Scene(TomlTable, kw_only=True, frozen=True, dict=True):
         check_act(self.act, names)
         check_observe(self.observe, names, self._cameras, has_task=self.task is not None)
         hands = hands_led(self.act or ActTable(), names)
-        check_vary(self.vary, hands, [row.between for row in self.interfaces], self.task)
+        layers = [row.between for row in self.interfaces]
+        seen_by = [row.name for row in (self.observe or ObserveTable()).cameras]
+        check_vary(self.vary, hands, layers, seen_by, self.task)
 
     @property
     def bodies(self) -> tuple[OneOfBodiesTable, ...]:

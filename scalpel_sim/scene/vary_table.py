@@ -38,12 +38,32 @@ OF_START = ("start.x", "start.y", "start.z")
 OF_SENSOR = ("sensor.force", "sensor.torque", "sensor.delay")
 """Errors of the force sensor, in place of those of `[observe]`."""
 
-VARIED = (*OF_MATERIAL, OF_LAYER, *OF_LINE, *OF_START, *OF_SENSOR)
+OF_CAMERA = ("camera.x", "camera.y", "camera.z")
+"""Displacements of the eye of a camera, which goes on looking at the same point."""
+
+OF_LIGHT = "light.brightness"
+"""Factor of all lamps of images."""
+
+OF_COLOUR = ("colour.red", "colour.green", "colour.blue")
+"""Factors of the light that the body reflects."""
+
+OF_LOOK = (*OF_CAMERA, OF_LIGHT, *OF_COLOUR)
+"""Quantities that only images show."""
+
+VARIED = (*OF_MATERIAL, OF_LAYER, *OF_LINE, *OF_START, *OF_SENSOR, *OF_LOOK)
 """All that can differ."""
 
 LEAST_FACTOR, MOST_FACTOR = 0.1, 10.0
 """Bounds of factors: beyond them it is another tissue, and with ten times the stiffness, or a tenth
 of the density, a second takes three times as many steps."""
+
+OWNERS = {
+    "label": (*OF_MATERIAL, *OF_COLOUR),
+    "between": (OF_LAYER,),
+    "hand": OF_START,
+    "camera": OF_CAMERA,
+}
+"""Keys that say of what a quantity is, and the quantities that have them."""
 
 MOST_TURN = 180.0
 """Largest turn of a line [degree]."""
@@ -76,6 +96,13 @@ class VaryTable(TomlTable, kw_only=True, frozen=True):
             "sensor.force",
             "sensor.torque",
             "sensor.delay",
+            "camera.x",
+            "camera.y",
+            "camera.z",
+            "light.brightness",
+            "colour.red",
+            "colour.green",
+            "colour.blue",
         ],
         one_of(*VARIED),
     ]
@@ -87,16 +114,18 @@ class VaryTable(TomlTable, kw_only=True, frozen=True):
     )
     """Distribution between them: uniform; or log_uniform, as often by half as by double."""
     label: Label | None = None
-    """Part of the body of whose material it is a factor; all of it without."""
+    """Part of the body of whose material or colour it is a factor; all of it without."""
     between: TwoLabels | None = None
     """Names of the two parts between which the layer is."""
     hand: Name | None = None
     """Hand that starts elsewhere, blade or the name of a grasper; the blade without."""
+    camera: Label | None = None
+    """Camera of `[observe]` that is elsewhere; all of them without."""
 
     @property
     def name(self) -> str:
         """Name of its number in a draw, such as `material.toughness:fat` or `start.x:left`."""
-        own = [self.label, None if self.hand == BLADE_NAME else self.hand]
+        own = [self.label, None if self.hand == BLADE_NAME else self.hand, self.camera]
         of = "+".join([*filter(None, own), *sorted(self.between or ())])
         return f"{self.what}:{of}" if of else self.what
 
@@ -113,6 +142,7 @@ def check_vary(
     rows: Sequence[VaryTable],
     hands: Sequence[str],
     layers: Sequence[tuple[str, str]],
+    cameras: Sequence[str],
     task: TaskTable | None,
 ) -> None:
     """Check that each row makes sense in its scene.
@@ -121,6 +151,7 @@ def check_vary(
         rows: The rows.
         hands: Names of the hands that a policy leads.
         layers: Names of the two parts between which each layer is.
+        cameras: Names of the cameras of images.
         task: The task; None: there is none.
 
     Raises:
@@ -130,6 +161,11 @@ def check_vary(
         where = f"[[vary]] number {i + 1}, of {row.what},"
         _check_range(row, where)
         _check_owner(row, where, hands, layers)
+        if row.what in OF_LOOK and not cameras:
+            raise UsageError(f"{where} is seen in images alone: add `cameras` to [observe]")
+        if row.what in OF_CAMERA and row.camera is not None and row.camera not in cameras:
+            asked = unknown("camera of [observe]", row.camera, cameras)
+            raise UsageError(f"{where} camera: {asked}")
         if row.what in OF_LINE and (task is None or task.line is None):
             raise UsageError(f"{where} moves the line of a task: add `line` to [task]")
         if any(row.name == other.name for other in rows[:i]):
@@ -151,11 +187,11 @@ def _check_range(row: VaryTable, where: str) -> None:
 
 def _bounds(what: str) -> tuple[float, float, str]:
     """Return the lowest and the highest number that a quantity may have, and what it is."""
-    if what in OF_MATERIAL or what == OF_LAYER:
+    if what in (*OF_MATERIAL, OF_LAYER, OF_LIGHT, *OF_COLOUR):
         return LEAST_FACTOR, MOST_FACTOR, "a factor"
     if what == "task.line.turn":
         return -MOST_TURN, MOST_TURN, "a turn [degree]"
-    if what in OF_LINE or what in OF_START:
+    if what in (*OF_LINE, *OF_START, *OF_CAMERA):
         return -MOST_WAY, MOST_WAY, "a displacement [m]"
     if what == "sensor.delay":
         return 0.0, LONGEST_DELAY, "a delay [s]"
@@ -166,10 +202,10 @@ def _check_owner(
     row: VaryTable, where: str, hands: Sequence[str], layers: Sequence[tuple[str, str]]
 ) -> None:
     """Refuse a part, a layer or a hand that is not there, or that another quantity has."""
-    given = {"label": row.label, "between": row.between, "hand": row.hand}
-    own = "label" if row.what in OF_MATERIAL else "between" if row.what == OF_LAYER else "hand"
+    given = {key: getattr(row, key) for key in OWNERS}
+    own = next((key for key, quantities in OWNERS.items() if row.what in quantities), None)
     for key, value in given.items():
-        if value is not None and (key != own or row.what in (*OF_LINE, *OF_SENSOR)):
+        if value is not None and key != own:
             raise UsageError(f"{where} has the key {key}, which belongs to others; omit it")
     if row.what == OF_LAYER:
         pairs = [sorted(layer) for layer in layers]

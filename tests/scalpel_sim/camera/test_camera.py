@@ -269,6 +269,14 @@ def test_views_of_the_scene_come_first_and_are_where_it_says():
     assert np.allclose(place_of(camera).eye, eye)
 
 
+def test_a_camera_of_the_model_is_not_put_elsewhere_and_an_unknown_part_has_no_colour():
+    with Camera(theatre_with(cut_tissue(0)), "side", width=8, height=8) as camera:
+        with pytest.raises(UsageError, match="'side' is one of the model, and stays where"):
+            camera.move_eye((0.0, 0.0, 0.01))
+        with pytest.raises(UsageError, match="no part of the body is called 'skim'"):
+            camera.change_look(tints={"skim": (1.0, 0.5, 0.5)})
+
+
 def test_an_unknown_camera_is_refused_with_the_names_of_all():
     theatre = theatre_with(cut_tissue(0))
     with pytest.raises(UsageError, match="no camera is called 'wirst'"):
