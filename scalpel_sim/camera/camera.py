@@ -8,9 +8,10 @@ from typing import NamedTuple, Self
 import mujoco
 import numpy as np
 
+from scalpel_sim.arm.free_names import free_name
 from scalpel_sim.camera.canvas import Canvas, PixelSize
 from scalpel_sim.camera.composition import Thing
-from scalpel_sim.camera.finishes import POLISHED_STEEL
+from scalpel_sim.camera.finishes import PEN_INK, POLISHED_STEEL
 from scalpel_sim.camera.identities import Identities
 from scalpel_sim.camera.lenses import pixels_through, sight_through
 from scalpel_sim.camera.lights import WALL_COLOUR, Light, usual_lights
@@ -332,6 +333,9 @@ class _Stage:
             self._parts = TissueParts(labels)
             finishes = part_finishes(labels, look)
         self.identities = Identities(theatre, list(finishes))
+        self._ink = free_name("ink", finishes)
+        if theatre.ink is not None:
+            finishes[self._ink] = PEN_INK
         sheets = [shape for shape in shapes_of(theatre.model) if shape.is_blade]
         names = {shape.geom: f"blade of geom {shape.geom}" for shape in sheets}
         self.canvas = Canvas(
@@ -384,3 +388,5 @@ class _Stage:
         if self._parts.show(self._link.surface()):
             for name, mesh in self._parts.meshes.items():
                 self.canvas.put(name, mesh, self.theatre.frame)
+        if self.theatre.ink is not None:
+            self.canvas.put(self._ink, self.theatre.ink(), self.theatre.frame)

@@ -193,7 +193,8 @@ class Composition:
             place, colour = placed.frame.origin, self._colours[name]
             mujoco.mjv_initGeom(geom, kind, _NO_SIZE, place, _UPRIGHT, colour)
             geom.objtype, geom.objid = int(mujoco.mjtObj.mjOBJ_UNKNOWN), number
-            geom.segid = scene.ngeom
+            # Of ink -1, with which it is left out where numbers are drawn.
+            geom.segid = -1 if self._finishes[name].is_ink else scene.ngeom
             self._finish(geom, name, render)
             scene.ngeom += 1
             before = self._written.get(name)

@@ -21,10 +21,15 @@ class Finish(NamedTuple):
     """Sharpness of highlights, from 0 to 1."""
     glow: float = 0.0
     """Light that it gives off, as a factor of its colour."""
+    is_ink: bool = False
+    """Whether it is colour alone: depth and numbers of pixels are of what is behind it."""
 
 
 POLISHED_STEEL = Finish((0.8, 0.82, 0.85, 1.0), gloss=1.0, shininess=0.9)
 """Look of a blade."""
+
+PEN_INK = Finish((0.2, 0.11, 0.55, 1.0), gloss=0.0, glow=0.3, is_ink=True)
+"""Look of a line that a pen has drawn on the skin: gentian violet, as the page has it."""
 
 
 class Picture(NamedTuple):

@@ -81,7 +81,7 @@ class Identities:
     def _of(self, thing: Thing) -> int:
         """Return the number of a thing."""
         if thing.mesh is not None:
-            return self._parts[thing.mesh]
+            return self._parts.get(thing.mesh, 0)  # ink has none, and no pixel shows it
         if thing.kind == int(mujoco.mjtObj.mjOBJ_GEOM):
             return int(self._geoms[thing.number])
         return self._arm if thing.kind in _OF_ARM else self._world

@@ -1,6 +1,7 @@
 """Models and tissue that cameras see."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import mujoco
@@ -8,9 +9,11 @@ import mujoco
 from bridge import InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.blade import Blade
 from scalpel_sim.arm.grasper import Grasper
+from scalpel_sim.camera.pen_mark import pen_mark
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.viewer.looks import Look, look_of_scene
+from scalpel_sim.viewer.primitives import TriangleMesh
 from tissue import Tissue
 
 
@@ -36,6 +39,8 @@ class Theatre(NamedTuple):
     """Cameras besides those of the model, in the frame of the tissue."""
     look: Look | None = None
     """Look of the tissue; None: that of its material."""
+    ink: Callable[[], TriangleMesh] | None = None
+    """Returns what is drawn on the skin as it is now, tissue frame; None: nothing is."""
 
     @property
     def link(self) -> TissueLink | None:
@@ -59,6 +64,7 @@ def theatre_of(simulation: Simulation) -> Theatre:
     """Return what cameras of a simulation see."""
     scene, arm = simulation.scene, simulation.arm
     look = None if scene is None else look_of_scene(scene)
+    is_marked = scene is not None and scene.task is not None and scene.task.marked
     return Theatre(
         arm.model,
         arm.data,
@@ -68,4 +74,5 @@ def theatre_of(simulation: Simulation) -> Theatre:
         {each.name: each.grasper for each in simulation.graspers},
         () if scene is None else scene.views,
         look,
+        partial(pen_mark, simulation) if is_marked else None,
     )

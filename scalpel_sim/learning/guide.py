@@ -1,4 +1,4 @@
-"""`Guide`: how far a blade is from what of a plan is still to be cut."""
+"""`Guide`: how far a blade is from what of a plan is to be cut next."""
 
 import numpy as np
 
@@ -12,10 +12,12 @@ MOST_PLACES = 64
 
 
 class Guide:
-    """Finds the way of a blade to what of a plan is still to be cut.
+    """Finds the way of a blade to what of a plan is to be cut next.
 
     A plan with a line is represented by the bottom of the cut below each station of it, so that
-    the way leads into the depth; another one by places spread over it.
+    the way leads into the depth, and from the first to the last. The nearest one would hold a
+    blade that has cut too little where it is: pressing does not cut. Another plan is represented
+    by places spread over it, of which the nearest is next.
 
     Args:
         simulation: At its start.
@@ -24,7 +26,8 @@ class Guide:
 
     def __init__(self, simulation: Simulation, plan: Plan) -> None:
         points = plan.surface.points
-        if len(plan.stations):
+        self._has_order = len(plan.stations) > 0
+        if self._has_order:
             wanted = plan.stations + np.outer(plan.depths, plan.into)
         else:
             wanted = farthest_points(points, min(MOST_PLACES, len(points)))
@@ -38,7 +41,7 @@ class Guide:
         return self._holders
 
     def way(self, tip: FloatArray, is_covered: BoolArray) -> float:
-        """Return the distance from the tip to the nearest place that is not cut [m]; 0: all are.
+        """Return the distance from the tip to the place that is cut next [m]; 0: all are cut.
 
         Args:
             tip: The tip [m], tissue frame.
@@ -48,11 +51,12 @@ class Guide:
         is_left = ~is_covered[self._places]
         if not is_left.any():
             return 0.0
-        return float(np.linalg.norm(at[is_left] - tip, axis=1).min())
+        ways = np.linalg.norm(at[is_left] - tip, axis=1)
+        return float(ways[0] if self._has_order else ways.min())
 
 
 def _nearest(points: FloatArray, wanted: FloatArray) -> IntArray:
-    """Return the points that are nearest to some places, each once."""
+    """Return the points that are nearest to some places, each once, in the order of these."""
     # |p - w|^2 without |w|^2, which is the same for all points.
     squares = (points**2).sum(axis=1) - 2.0 * np.einsum("wk,pk->wp", wanted, points)
-    return np.unique(squares.argmin(axis=1))
+    return np.array(list(dict.fromkeys(squares.argmin(axis=1).tolist())))

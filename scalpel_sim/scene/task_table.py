@@ -123,9 +123,9 @@ class RewardTable(TomlTable, kw_only=True, frozen=True):
     time: Finite = 0.0
     """Weight of the time [1/s]."""
     approach: Finite = 0.0
-    """Weight of the distance from the tip of the blade to the nearest place of the plan that is
-    not cut yet [1/m]: to the bottom of the cut below a line. It guides, and is no term of the
-    score."""
+    """Weight of the distance from the tip of the blade to the place of the plan that is cut next
+    [1/m]: the bottom of the cut below the first place of a line that is not cut yet, and without a
+    line the nearest place. It guides, and is no term of the score."""
     success: Finite = 0.0
     """Worth of success, once."""
 
@@ -154,6 +154,8 @@ class TaskTable(TomlTable, kw_only=True, frozen=True):
     they enter."""
     tolerance: Positive = DEFAULT_TOLERANCE
     """Distance from the plan that counts as on it [m]."""
+    marked: TrueOrFalse = False
+    """Whether the line of the plan is on the skin, drawn by a pen: cameras see it."""
     target: Label | None = None
     """Part of the body that is cut out, or laid bare."""
     camera: Label | None = None

@@ -1,4 +1,4 @@
-"""A weight of `approach` pays a blade for its way to what is still to be cut."""
+"""A weight of `approach` pays a blade for its way to what is to be cut next."""
 
 import numpy as np
 import pytest
@@ -29,10 +29,10 @@ def begin(episode):
 
 
 def way(tip, bottoms):
-    return np.linalg.norm(bottoms - tip, axis=1).min()
+    return np.linalg.norm(bottoms[0] - tip)
 
 
-def test_a_blade_is_paid_for_coming_nearer_to_the_bottom_of_the_cut(episode):
+def test_a_blade_is_paid_for_coming_nearer_to_the_first_bottom_of_the_cut(episode):
     before, bottoms = begin(episode)
     action = np.zeros(len(episode.action_names))
     action[:2] = 0.3, 0.6  # across, and along the edge to the tip: in the air
