@@ -16,6 +16,7 @@ from benchmarks.scaling import cut, kernels, scaling
 from benchmarks.scene_costs import measure_scene_costs
 from benchmarks.strokes import random_strokes
 from benchmarks.studies.cutting_law import cutting_law
+from benchmarks.studies.environments import environments
 from benchmarks.studies.mesh_study import mesh_study
 from benchmarks.studies.tasks import tasks
 from benchmarks.timing import Rounds, TurnWatch
@@ -62,6 +63,7 @@ BENCHMARKS: dict[str, Callable[..., BenchmarkResult | list[BenchmarkResult]]] = 
     "mesh-study": mesh_study,
     "cutting-law": cutting_law,
     "tasks": tasks,
+    "environments": environments,
 }
 """The benchmarks by name. Arguments `runs` and `watch` come from the options that all have."""
 

@@ -56,10 +56,12 @@ def image_size(width: int, height: int) -> PixelSize:
     Raises:
         UsageError: an image cannot have it.
     """
-    if not all(1 <= side <= _MOST_PIXELS for side in (width, height)):
-        raise UsageError(
-            f"an image of {width} x {height} pixels: each side must have 1 to {_MOST_PIXELS}"
-        )
+    for side in (width, height):
+        if not isinstance(side, int | np.integer) or not 1 <= side <= _MOST_PIXELS:
+            raise UsageError(
+                f"an image of {width} x {height} pixels: each side must have 1 to {_MOST_PIXELS}, "
+                "a whole number"
+            )
     return PixelSize(width, height)
 
 

@@ -7,13 +7,13 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Dict
 
-from scalpel_sim.camera.camera import Camera
+from scalpel_sim.camera.camera import Camera, image_size
+from scalpel_sim.camera.viewpoints import expect_camera
 from scalpel_sim.errors import UsageError
 from scalpel_sim.learning.episode import Episode, Outcome
 from scalpel_sim.learning.episode_state import EpisodeState
 from scalpel_sim.learning.images import ImageTaker
 from scalpel_sim.learning.live_page import LivePage
-from scalpel_sim.scene.read import read_scene, scene_called
 from scalpel_sim.scene.scene import Scene
 from tissue import FloatArray
 
@@ -76,7 +76,7 @@ class TissueEnv(gymnasium.Env[Any, Any]):
             raise UsageError(
                 f"render_mode is '{render_mode}'; it must be one of {', '.join(RENDER_MODES)}"
             )
-        self.episode = Episode(task_scene(scene), arm)
+        self.episode = Episode(scene, arm)
         """The task itself, with its simulation."""
         self.render_mode = render_mode
         self.metadata = self.metadata | {
@@ -84,7 +84,10 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         }
         self._obs = obs
         self._images = ImageTaker(self.episode) if obs in ("images", "all") else None
-        self._rendered = (camera, width, height)
+        if camera is not None:
+            simulation = self.episode.simulation
+            expect_camera(camera, self.episode.scene.views, simulation.arm.model)
+        self._rendered = (camera, *image_size(width, height))
         self._camera: Camera | None = None
         self._page: LivePage | None = None
         n = len(self.episode.action_names)
@@ -126,7 +129,7 @@ class TissueEnv(gymnasium.Env[Any, Any]):
             UsageError: there is no such option, or a number is missing, unknown or out of range.
             StateError: the state is of another task, or no state.
         """
-        given = dict(options or {})
+        given = options_by_name(options)
         variation, state = (given.pop(name, None) for name in RESET_OPTIONS)
         if given:
             name = next(iter(given))
@@ -224,14 +227,12 @@ class TissueEnv(gymnasium.Env[Any, Any]):
         return self._page
 
 
-def task_scene(given: str | Path | Scene) -> Scene:
-    """Return a scene that is given by its name, or by its file.
+def options_by_name(options: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a copy of the options of `reset`.
 
     Raises:
-        UsageError: it cannot be read.
+        UsageError: they are not by name.
     """
-    if isinstance(given, Scene):
-        return given
-    if isinstance(given, Path) or given.endswith(".toml"):
-        return read_scene(given)
-    return scene_called(given)
+    if options is not None and not isinstance(options, dict):
+        raise UsageError(f"options of reset are {options!r}; they are a dict, by their names")
+    return dict(options or {})

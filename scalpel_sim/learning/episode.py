@@ -2,9 +2,11 @@
 
 import logging
 import math
+import textwrap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +29,7 @@ from scalpel_sim.preparation.prepare import prepare
 from scalpel_sim.scene.act_table import ActTable, hands_led
 from scalpel_sim.scene.arm_tables import BLADE_NAME
 from scalpel_sim.scene.observe_table import ObserveTable, quantities_shown
+from scalpel_sim.scene.read import read_scene, scene_called
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scoring.score import Score
 from scalpel_sim.strokes.kind import StrokeTable
@@ -40,6 +43,9 @@ FAULTS = (TissueError, CouplingError, ArmError, ValueError)
 that meets what it cannot bear, it is a ValueError."""
 
 _log = logging.getLogger("scalpel_sim")
+
+_LONGEST_REPR = 100
+"""Characters of a wrong action that its error repeats."""
 
 _NEVER_MENDED = ("off_plan", "spared", "force", "strain_above", "healthy")
 """Conditions that no later step makes hold again."""
@@ -64,15 +70,16 @@ class Episode:
     """A task of a scene, over and over: prepared once, and put back to its start by `reset`.
 
     Args:
-        scene: A scene with a task.
+        scene: A scene with a task: its name, a TOML file, or the scene itself.
         arm: `KINEMATIC` or `FULL`; None: what `[act]` of the scene says.
 
     Raises:
-        UsageError: the scene has no task, or there is no such level.
+        UsageError: there is no such scene or level, or the scene has no task.
         ValueError: parts of it do not fit together.
     """
 
-    def __init__(self, scene: Scene, arm: str | None = None) -> None:
+    def __init__(self, scene: str | Path | Scene, arm: str | None = None) -> None:
+        scene = task_scene(scene)
         if arm not in (None, KINEMATIC, FULL):
             raise UsageError(f"arm is '{arm}'; it must be {KINEMATIC} or {FULL}")
         if scene.task is None:
@@ -194,17 +201,13 @@ class Episode:
                 clipped.
 
         Raises:
-            ValueError: it has another shape, or a number is not finite.
+            UsageError: it has another shape, or a number is not finite; or the episode has failed.
         """
-        action = np.asarray(action, np.float64)
-        if action.shape != (len(self.action_names),) or not np.isfinite(action).all():
-            raise ValueError(
-                f"an action of '{self.scene.name}' is {len(self.action_names)} finite numbers, "
-                f"not {action.tolist()}"
-            )
+        shape = (len(self.action_names),)
+        action = finite_numbers(action, shape, f"an action of '{self.scene.name}' is")
         simulation = self.simulation
         if self.fault is not None:
-            raise ValueError("the simulation has failed in this episode: call reset()")
+            raise UsageError("the simulation has failed in this episode: call reset()")
         self.hand.obey(action, self._wrenches())
         self._felt.begin()
         try:
@@ -310,6 +313,44 @@ class Episode:
         simulation = self.simulation
         found = {each.name: each.wrench for each in simulation.graspers}
         return {BLADE_NAME: simulation.blade.wrench, **found}
+
+
+def task_scene(given: str | Path | Scene) -> Scene:
+    """Return a scene that is given by its name, or by its file.
+
+    Raises:
+        UsageError: it cannot be read, or is none of these.
+    """
+    if isinstance(given, Scene):
+        return given
+    if isinstance(given, Path) or (isinstance(given, str) and given.endswith(".toml")):
+        return read_scene(given)
+    if isinstance(given, str):
+        return scene_called(given)
+    raise UsageError(f"scene is {given!r}; it must be the name of a scene, a TOML file, or a Scene")
+
+
+def finite_numbers(given: Any, shape: tuple[int, ...], what: str) -> FloatArray:
+    """Return actions as an array.
+
+    Args:
+        given: An array, or lists of numbers.
+        shape: Shape that it must have.
+        what: What it is, as the message begins: `an action is`.
+
+    Raises:
+        UsageError: it has another shape, or does not consist of finite numbers.
+    """
+    try:
+        array = np.asarray(given)
+        is_right = array.shape == shape and array.dtype.kind in "biuf" and np.isfinite(array).all()
+    except ValueError:  # rows of several lengths
+        is_right = False
+    if not is_right:
+        n = " x ".join(map(str, shape))
+        said = textwrap.shorten(repr(given), _LONGEST_REPR)
+        raise UsageError(f"{what} {n} finite numbers, not {said}")
+    return array.astype(np.float64)
 
 
 @contextmanager

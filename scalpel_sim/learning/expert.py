@@ -6,6 +6,7 @@ import numpy as np
 from bridge import InProcessLink
 from scalpel_sim.arm.grasper import HALF_PAD
 from scalpel_sim.arm.hand import HandCommand
+from scalpel_sim.errors import UsageError
 from scalpel_sim.hands.driven_instruments import LiveInstrument
 from scalpel_sim.instruments.guarded_follower import GuardedFollower, StrokeProgress
 from scalpel_sim.instruments.instrument import Controller
@@ -63,9 +64,17 @@ class Expert:
 
     Args:
         episode: After `reset`; make a new one for each episode.
+
+    Raises:
+        UsageError: it is no episode.
     """
 
     def __init__(self, episode: Episode) -> None:
+        if not isinstance(episode, Episode):
+            raise UsageError(
+                f"an expert acts in an Episode, not in {type(episode).__name__}: an environment "
+                "has it as env.unwrapped.episode"
+            )
         self._episode, simulation = episode, episode.simulation
         scene, frame, link = episode.scene, simulation.frame, simulation.link
         assert isinstance(link, InProcessLink)

@@ -83,6 +83,8 @@ class ImageTaker:
 
     def take(self) -> dict[str, np.ndarray]:
         """Return the images of this instant, by name."""
+        if not self._cameras:
+            self.begin()
         found: dict[str, np.ndarray] = {}
         for row in self._rows:
             found |= _taken(row, self._cameras[row.name])

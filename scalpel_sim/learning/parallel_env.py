@@ -9,7 +9,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from pettingzoo import ParallelEnv
 
+from scalpel_sim.errors import UsageError
 from scalpel_sim.learning.environment import RESET_OPTIONS, TissueEnv
+from scalpel_sim.learning.episode import finite_numbers
+from scalpel_sim.learning.registration import NAMESPACE
 from scalpel_sim.scene.scene import Scene
 
 Each = dict[str, Any]
@@ -53,8 +56,15 @@ class TissueParallelEnv(ParallelEnv[str, Any, np.ndarray]):  # type: ignore[misc
         return self._for_each(observed), {name: dict(info) for name in self.agents}
 
     def step(self, actions: Mapping[str, np.ndarray]) -> tuple[Each, Each, Each, Each, Each]:
-        """Do the actions of all hands over a control step; see `Episode.act`."""
-        action = np.concatenate([actions[name] for name in self.possible_agents])
+        """Do the actions of all hands over a control step; see `Episode.act`.
+
+        Raises:
+            UsageError: no episode has begun, or the last one has ended; or an action is missing,
+                has another shape, or is not finite.
+        """
+        if not self.agents:
+            raise UsageError("no episode goes on: begin one by reset()")
+        action = np.concatenate([self._checked(actions, name) for name in self.agents])
         observed, reward, terminated, truncated, info = self.env.step(action)
         found = (observed, reward, terminated, truncated)
         infos = {name: dict(info) for name in self.agents}
@@ -62,6 +72,18 @@ class TissueParallelEnv(ParallelEnv[str, Any, np.ndarray]):  # type: ignore[misc
         if terminated or truncated:
             self.agents = []
         return observations, rewards, terminations, truncations, infos
+
+    def _checked(self, actions: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+        """Return the action of an agent.
+
+        Raises:
+            UsageError: it is missing, has another shape, or is not finite.
+        """
+        if not isinstance(actions, Mapping) or name not in actions:
+            given = ", ".join(map(str, actions)) if isinstance(actions, Mapping) else repr(actions)
+            raise UsageError(f"actions have none of '{name}', only {given or 'none'}")
+        shape = self.action_spaces[name].shape
+        return finite_numbers(actions[name], shape, f"an action of '{name}' is")
 
     def _for_each(self, value: Any) -> Each:
         return dict.fromkeys(self.agents, value)
@@ -85,8 +107,9 @@ def parallel_env(task: str | Path | Scene, **settings: Any) -> TissueParallelEnv
 
     Raises:
         UsageError: there is no such scene, or an argument has no such value.
+        gymnasium.error.UnregisteredEnv: there is no such id.
     """
-    if isinstance(task, str) and task in gymnasium.registry:
+    if isinstance(task, str) and (task in gymnasium.registry or task.startswith(f"{NAMESPACE}/")):
         settings = gymnasium.spec(task).kwargs | settings
     else:
         settings = {"scene": task, **settings}

@@ -8,6 +8,7 @@ import itertools
 import logging
 import math
 from collections.abc import Mapping
+from numbers import Real
 
 import numpy as np
 from msgspec import structs
@@ -79,21 +80,25 @@ class Variation:
         Raises:
             UsageError: a name is unknown or missing, or a number is out of its range.
         """
-        for name in given:
+        if not isinstance(given, Mapping):
+            raise UsageError(
+                f"the variation is {given!r}; it is the numbers of [[vary]] by name, as info has it"
+            )
+        for name in map(str, given):
             if name not in self.names:
                 raise unknown("number of [[vary]]", name, self.names)
-        found = {}
+        found: dict[str, float] = {}
         for row in self._rows:
             if row.name not in given:
                 raise UsageError(
                     f"the variation has no {row.name}; it has all of [[vary]], or none"
                 )
-            number, (low, high) = float(given[row.name]), row.range
-            if not low <= number <= high:
+            number, (low, high) = given[row.name], row.range
+            if not isinstance(number, Real) or not low <= float(number) <= high:
                 raise UsageError(
-                    f"{row.name} of the variation is {number:g}; [[vary]] has {low:g} to {high:g}"
+                    f"{row.name} of the variation is {number!r}; [[vary]] has {low:g} to {high:g}"
                 )
-            found[row.name] = number
+            found[row.name] = float(number)
         return found
 
     def apply(self, drawn: Mapping[str, float]) -> None:

@@ -19,7 +19,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.learning.environment import HUMAN, TissueEnv, task_scene
+from scalpel_sim.learning.environment import HUMAN, TissueEnv, options_by_name
+from scalpel_sim.learning.episode import finite_numbers, task_scene
 from scalpel_sim.learning.worker import Infos, Job, SharedArrays, work
 from scalpel_sim.scene.scene import Scene
 from tissue import BoolArray, FloatArray
@@ -134,12 +135,10 @@ class TissueVectorEnv(VectorEnv[Any, Any, Any]):
             RunError: a process failed.
         """
         n = self.num_envs
-        seeds = [seed + i for i in range(n)] if isinstance(seed, int) else seed
-        if seeds is not None and len(seeds) != n:
-            raise UsageError(f"there are {n} environments and {len(seeds)} seeds: give one of each")
-        options = dict(options or {})
+        seeds = _seeds(seed, n)
+        options = options_by_name(options)
         mask = _mask(options.pop(RESET_MASK, np.ones(n, np.bool_)), n)
-        own = {i: None if seeds is None else seeds[i] for i in range(n) if mask[i]}
+        own = {i: seeds[i] for i in range(n) if mask[i]}
         infos = self._merged(self._told("reset", own, options))
         return self._observed(), infos
 
@@ -157,12 +156,7 @@ class TissueVectorEnv(VectorEnv[Any, Any, Any]):
             RunError: a process failed.
         """
         views = self._views
-        actions = np.asarray(actions, np.float64)
-        if actions.shape != views.actions.shape or not np.isfinite(actions).all():
-            raise UsageError(
-                f"actions are finite numbers of the shape {views.actions.shape}, not "
-                f"{actions.shape if np.isfinite(actions).all() else actions.tolist()}"
-            )
+        actions = finite_numbers(actions, views.actions.shape, "actions are")
         if self.autoreset_mode is AutoresetMode.DISABLED:
             ended = np.flatnonzero(views.terminated | views.truncated)
             if len(ended):
@@ -184,6 +178,7 @@ class TissueVectorEnv(VectorEnv[Any, Any, Any]):
             kwargs: More of them.
 
         Raises:
+            UsageError: environments have nothing of that name.
             RunError: a process failed.
         """
         return tuple(each for found in self._told("call", name, args, kwargs) for each in found)
@@ -241,7 +236,9 @@ class TissueVectorEnv(VectorEnv[Any, Any, Any]):
         answers = [_answer(each) for each in processes]
         for each, (is_done, what) in zip(processes, answers, strict=True):
             if not is_done:
-                raise what if isinstance(what, ValueError) else _failed(each, str(what))
+                if isinstance(what, ValueError):
+                    raise what
+                raise _failed(each, str(what)) from what
         return [what for _, what in answers]
 
 
@@ -319,10 +316,32 @@ def _mode(given: str | AutoresetMode) -> AutoresetMode:
     }
     if isinstance(given, AutoresetMode):
         return given
-    if given not in modes:
+    if not isinstance(given, str) or given not in modes:
         known = ", ".join(each.name for each in AutoresetMode)
         raise UsageError(f"autoreset_mode is {given!r}; it must be one of {known}")
     return modes[given]
+
+
+def _seeds(given: int | Sequence[int | None] | None, n: int) -> list[int | None]:
+    """Return the seed of each environment.
+
+    Raises:
+        UsageError: it is no seed, or there is not one of each.
+    """
+    if given is None:
+        return [None] * n
+    if isinstance(given, int | np.integer):
+        seeds: list[Any] = [int(given) + i for i in range(n)]
+    elif isinstance(given, str) or not hasattr(given, "__len__"):
+        seeds = [given]
+    else:
+        seeds = list(given)
+        if len(seeds) != n:
+            raise UsageError(f"there are {n} environments and {len(seeds)} seeds: give one of each")
+    for each in seeds:
+        if each is not None and (not isinstance(each, int | np.integer) or each < 0):
+            raise UsageError(f"a seed is {each!r}; it must be a whole number from 0, or None")
+    return [None if each is None else int(each) for each in seeds]
 
 
 def _mask(given: Any, n: int) -> BoolArray:

@@ -3,6 +3,7 @@
 import contextlib
 import math
 import signal
+import traceback
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 from gymnasium.spaces import Box, Dict
 from gymnasium.vector import AutoresetMode
 
-from scalpel_sim.errors import one_line
+from scalpel_sim.errors import UsageError, one_line
 from scalpel_sim.learning.environment import ObservedArrays, TissueEnv
 from tissue import BoolArray, FloatArray
 
@@ -156,7 +157,13 @@ class Worker:
         return info
 
     def call(self, name: str, given: tuple[Any, ...], named: dict[str, Any]) -> list[Any]:
-        """Return what a method of each environment returns, or what an attribute is."""
+        """Return what a method of each environment returns, or what an attribute is.
+
+        Raises:
+            UsageError: there is nothing of that name.
+        """
+        if not all(hasattr(env, name) for env in self._envs.values()):
+            raise UsageError(f"an environment has no '{name}'")
         found = [getattr(env, name) for env in self._envs.values()]
         return [each(*given, **named) if callable(each) else each for each in found]
 
@@ -191,4 +198,6 @@ def _serve(connection: Connection, job: Job) -> None:
     except (EOFError, ConnectionError):
         raise
     except Exception as error:
-        connection.send((False, RuntimeError(one_line(error))))
+        told = RuntimeError(one_line(error))
+        told.add_note(traceback.format_exc())  # where it was, for who reads it elsewhere
+        connection.send((False, told))

@@ -18,6 +18,7 @@ from benchmarks.scaling import (
     measure_local_frames,
     measure_steps,
 )
+from benchmarks.studies.environments import environments
 from scalpel_sim.scene.read import SCENES
 from tests.support.measured import is_sane, printed
 
@@ -135,6 +136,16 @@ def test_wrong_arguments_of_a_benchmark_are_refused(words, expected, capsys):
     assert out == ""
     (line,) = (x for x in err.splitlines() if not x.startswith("compiling"))
     assert re.search(expected, line)
+
+
+def test_environments_are_timed_without_arms_with_arms_and_in_processes(capsys):
+    found = environments("ligament-v0", steps=3, many="ligament-v0", runs=1)
+    assert all(map(is_sane, found.measurements))
+    by_case = {each.case.partition(": ")[2]: each.median for each in found.measurements}
+    assert by_case["ratio of both"] == by_case["no arms"] / by_case["whole arms"]
+    assert by_case["two over one"] == by_case["processes: 2"] / by_case["processes: 1"]
+    assert by_case["reset"] > 0.0
+    assert "the load was" in " ".join(printed(found, capsys).split())
 
 
 def test_images_are_timed_beside_the_simulation_that_they_show(renderer):

@@ -50,6 +50,9 @@ def test_the_checker_finds_nothing_where_images_are_shown(little_task):
     assert len(np.unique(observed["overview_rgb"])) > 20
     assert env.render().shape == (360, 480, 3)
     env.close()
+    again, *_ = env.unwrapped.step(np.zeros(13))  # as a first step without a reset, it draws
+    assert np.array_equal(again["overview_rgb"], observed["overview_rgb"])
+    env.close()
 
 
 def test_for_a_human_the_live_page_shows_the_episode_no_faster_than_it_is(little_task):
@@ -98,13 +101,28 @@ def test_wrong_arguments_are_told(little_task):
         ({"obs": "pixels"}, "obs is 'pixels'; it must be one of state, flat"),
         ({"render_mode": "ascii"}, "render_mode is 'ascii'"),
         ({"arm": "half"}, "arm is 'half'; it must be kinematic or full"),
+        ({"camera": "endo"}, "no camera is called 'endo'. Did you mean 'endoscope'"),
+        ({"width": 64.5}, "an image of 64.5 x 360 pixels: each side must have 1 to 8192, a whole"),
     ):
         with pytest.raises(UsageError, match=told):
             TissueEnv(little_task, **given)
-    with pytest.raises(UsageError, match="no scene is called 'incise'"):
-        TissueEnv("incise")
-    with pytest.raises(UsageError, match="reset has no option 'speed'"):
-        TissueEnv(little_task).reset(options={"speed": 1})
+    for scene, told in (
+        ("incise", "no scene is called 'incise'"),
+        (3, "scene is 3; it must be the name of a scene, a TOML file, or a Scene"),
+        ("slab", r"'slab' has no \[task\]"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            TissueEnv(scene)
+    env = TissueEnv(little_task)
+    for options, told in (
+        ({"speed": 1}, "reset has no option 'speed'"),
+        (["state"], r"options of reset are \['state'\]; they are a dict"),
+        ({"variation": [1.0]}, r"the variation is \[1.0\]; it is the numbers of \[\[vary"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            env.reset(options=options)
+    with pytest.raises(UsageError, match=r"not in TissueEnv: .* env.unwrapped.episode"):
+        Expert(env)
 
 
 def test_without_gymnasium_one_line_says_what_installs_it():

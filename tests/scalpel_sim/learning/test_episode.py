@@ -149,9 +149,10 @@ def test_a_simulation_that_fails_ends_the_episode_and_the_next_one_goes_on(episo
 
 def test_a_wrong_action_and_a_scene_without_a_task_are_refused(episode):
     begin(episode)
-    for wrong in (np.zeros(3), np.full(len(episode.action_names), np.nan)):
+    for wrong in (np.zeros(3), np.full(13, np.nan), None, "up", ["up"] * 13, [[1], [1, 2]]):
         with pytest.raises(ValueError, match=r"13 finite numbers"):
             episode.act(wrong)
+    assert episode.act([0] * 13).fault is None
     with pytest.raises(UsageError, match=r"'slab' has no \[task\]"):
         Episode(SCENES["slab"])
 

@@ -2,9 +2,12 @@
 
 import warnings
 
+import gymnasium
 import numpy as np
+import pytest
 from pettingzoo.test import parallel_api_test
 
+from scalpel_sim.errors import UsageError
 from scalpel_sim.learning import TissueEnv, parallel_env
 from tests.scalpel_sim.learning.little_task import little_task
 
@@ -42,3 +45,20 @@ def test_no_agent_is_left_when_an_episode_has_ended(little_task):
     while env.agents:
         _, _, _, truncations, _ = env.step(idle)
     assert truncations == {"blade": True, "left": True}
+
+
+def test_wrong_arguments_are_told(little_task):
+    with pytest.raises(gymnasium.error.NameNotFound, match="Did you mean: `Incise`"):
+        parallel_env("scalpel_sim/Incize-v0")
+    env = parallel_env(little_task)
+    idle = {name: np.zeros(space.shape) for name, space in env.action_spaces.items()}
+    with pytest.raises(UsageError, match=r"no episode goes on: begin one by reset\(\)"):
+        env.step(idle)
+    env.reset(seed=0)
+    for wrong, told in (
+        ({"blade": idle["blade"]}, "actions have none of 'left', only blade"),
+        ([0.0], r"actions have none of 'blade', only \[0.0\]"),
+        (idle | {"left": np.zeros(6)}, "an action of 'left' is 7 finite numbers"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            env.step(wrong)

@@ -16,7 +16,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from msgspec.structs import replace
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.learning import TissueEnv, TissueVectorEnv
+from scalpel_sim.learning import Episode, TissueEnv, TissueVectorEnv
 from scalpel_sim.learning.registration import OWN_SCENE
 from scalpel_sim.learning.worker import Job, SharedArrays, Worker
 from tests.scalpel_sim.learning.little_task import SCENE, little_task
@@ -108,18 +108,50 @@ def test_environments_begin_again_in_the_other_ways_too(short_task, mode):
                     envs.step(np.zeros(envs.action_space.shape))
 
 
-@battery(n_per_change=2, n_long=15)
-def test_any_number_of_processes_gives_the_same_bytes(case, short_task):
-    mode, workers = list(AutoresetMode)[case % 3], case // 3
-    expected = in_turn(short_task, mode)
+@pytest.fixture(scope="module")
+def state_that_fails(short_task):
+    """A state whose next step fails: velocities are no numbers."""
+    episode = Episode(short_task)
+    episode.simulation.link.tissue._stages.model.body.velocities[:] = np.nan
+    return episode.save_state().to_bytes()
+
+
+def done_from_states(envs, state_that_fails):
+    """Return all that comes of steps after a state, and of a simulation that fails and after it."""
+    rng, shape, found = np.random.default_rng(2), envs.action_space.shape, [envs.reset(seed=11)]
+    is_failing = np.arange(N) == 2
+
+    def go_on(n_steps):
+        for _ in range(n_steps):
+            found.append(envs.step(rng.uniform(-1.0, 1.0, shape).astype(np.float32)))
+
+    go_on(2)
+    state = envs.call("save_state")[1]
+    found.append(envs.reset(options={"state": state}))
+    go_on(2)
+    found.append(envs.reset(options={"state": state_that_fails, "reset_mask": is_failing}))
+    go_on(1)
+    assert (found[-1][3] == is_failing).all()
+    if envs.metadata["autoreset_mode"] is AutoresetMode.DISABLED:
+        found.append(envs.reset(options={"reset_mask": is_failing}))
+    go_on(3)
+    return plain(found)
+
+
+@battery(n_per_change=3, n_long=15)
+def test_any_number_of_processes_gives_the_same_bytes(case, short_task, state_that_fails):
+    mode, workers = list(AutoresetMode)[case % 3], (0, 3, 2, 4, 1)[case % 5]
+    makers = [lambda: TissueEnv(short_task)] * N
     if workers == 0:
-        makers = [lambda: TissueEnv(short_task)] * N
         envs = AsyncVectorEnv(makers, autoreset_mode=mode, context="spawn")
     else:
         envs = TissueVectorEnv(short_task, N, workers, mode)
         assert envs.workers == workers
-    assert done(envs) == expected
-    envs.close()
+    with closing(envs), closing(SyncVectorEnv(makers, autoreset_mode=mode)) as in_turn:
+        assert done(envs) == done(in_turn)
+        assert done_from_states(envs, state_that_fails) == done_from_states(
+            in_turn, state_that_fails
+        )
 
 
 def test_all_may_begin_at_a_state(envs, short_task):
@@ -159,6 +191,7 @@ def test_wrong_arguments_are_told(envs, short_task):
         ({"num_envs": 0}, "num_envs is 0; it must be a whole number from 1"),
         ({"workers": 1.5}, "workers is 1.5; it must be a whole number from 1"),
         ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; it must be one of NEXT_STEP, "),
+        ({"autoreset_mode": ["never"]}, r"autoreset_mode is \['never'\]; it must be one of"),
         ({"obs": "pixels"}, "obs is 'pixels'; it must be one of state"),
         ({"render_mode": "human"}, "watch one environment"),
     ):
@@ -166,10 +199,17 @@ def test_wrong_arguments_are_told(envs, short_task):
             TissueVectorEnv(short_task, **given)
     envs.reset(seed=0)
     for actions in (np.zeros((N, 2)), np.full(envs.action_space.shape, np.nan)):
-        with pytest.raises(UsageError, match=r"actions are finite numbers of the shape \(4, 13\)"):
+        with pytest.raises(UsageError, match="actions are 4 x 13 finite numbers"):
             envs.step(actions)
-    with pytest.raises(UsageError, match="there are 4 environments and 2 seeds"):
-        envs.reset(seed=[1, 2])
+    for seed, told in (
+        ([1, 2], "there are 4 environments and 2 seeds"),
+        ("a", "a seed is 'a'; it must be a whole number from 0"),
+        (-1, "a seed is -1"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            envs.reset(seed=seed)
+    with pytest.raises(UsageError, match="an environment has no 'save_stat'"):
+        envs.call("save_stat")
     with pytest.raises(UsageError, match="reset has no option 'speed'"):
         envs.reset(options={"speed": 1})
     with pytest.raises(UsageError, match=r"reset_mask is .* it must be True of one or more of 4"):
@@ -187,6 +227,18 @@ def test_a_process_that_dies_is_told_in_one_line_and_the_others_end(short_task):
     assert not runs(first)
     with pytest.raises(UsageError, match="the environments are closed"):
         envs.reset()
+
+
+def test_an_exception_in_a_process_is_told_with_its_place_and_all_processes_end(short_task):
+    envs = TissueVectorEnv(short_task, 2, 2)
+    ids = envs.process_ids
+    told = "^the process of environment 0 failed: .*Seed must be a python integer"
+    with pytest.raises(RunError, match=told) as error:
+        envs.call("reset", seed="a")
+    assert "environment.py" in error.value.__cause__.__notes__[0]
+    assert not any(map(runs, ids))
+    envs.close()
+    envs.close()
 
 
 def runs(process_id):
