@@ -51,6 +51,10 @@ class RenderError(RunError):
         super().__init__(f"images cannot be drawn: {what}. {remedy}")
         self.what, self.remedy = what, remedy
 
+    def __reduce__(self) -> tuple[type["RenderError"], tuple[str, str]]:
+        """Return how it is made again in the process that waits for images."""
+        return RenderError, (self.what, self.remedy)
+
 
 def set_backend_aside() -> None:
     """Keep MuJoCo from loading OpenGL, whatever `MUJOCO_GL` is; cameras still obey what it was.

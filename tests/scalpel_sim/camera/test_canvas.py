@@ -1,6 +1,7 @@
 """Pictures of models and meshes against MuJoCo's own renderer, and what they leave in memory."""
 
 import os
+import pickle
 import resource
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 from bridge import TissueFrame
 from scalpel_sim.camera.canvas import Canvas, PixelSize
 from scalpel_sim.camera.finishes import Finish
+from scalpel_sim.camera.gl_context import RenderError
 from scalpel_sim.camera.lights import Light
 from scalpel_sim.camera.viewpoints import Viewpoint
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED
@@ -316,6 +318,12 @@ if child == 0:
 assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 draw()
 """
+
+
+def test_why_nothing_can_be_drawn_comes_whole_from_another_process():
+    told = RenderError("there is no OpenGL", "Install it")
+    again = pickle.loads(pickle.dumps(told))
+    assert (str(again), again.remedy) == (str(told), "Install it")
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")

@@ -2,6 +2,7 @@
 
 import os
 import re
+import runpy
 import subprocess
 import sys
 import warnings
@@ -98,4 +99,17 @@ def test_the_checker_of_stable_baselines_finds_nothing(task, obs):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         checker.check_env(env)
+    env.close()
+
+
+@needs_renderer
+def test_lerobot_is_shown_instruments_forces_and_cameras_by_its_names():
+    hub = runpy.run_path(str(FOLDER / "env_hub.py"))
+    hub["make_env"].__globals__["TASKS"] = ("scalpel_sim/Incise-v0",)
+    env = hub["make_env"](n_envs=1)["scalpel_sim"][0]
+    observed, _ = env.reset(seed=[3], options={"lerobot_new_rollout": True})
+    after, *_ = env.step(env.action_space.sample())
+    assert env.observation_space.contains(after)
+    assert set(observed) == {"agent_pos", "pixels", "wrench"}
+    assert env.call("_max_episode_steps")[0] > 100 and env.call("task_description")[0]
     env.close()
