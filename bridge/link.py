@@ -182,7 +182,9 @@ class InProcessLink:
         self._tissue = tissue
         self._scene = scene
         self._views = tuple(views)
-        self._frames: list[Attachment] = list(tissue.attachments)
+        # Of one that the tissue has released and forgotten, only the load, which stays: a state has
+        # what is there.
+        self._frames: list[Attachment | FrameLoad] = list(tissue.attachments)
         self._n_own = len(self._frames)
         self._geoms: TouchedGeoms | None = None
         self._n_geoms = 0
@@ -229,12 +231,21 @@ class InProcessLink:
         if poses or self.n_driven:
             expect_each(poses, self.n_driven)
             for frame, pose in zip(self._frames[self._n_own :], poses, strict=True):
-                frame.move(pose.origin, pose.rotation)
+                if not isinstance(frame, FrameLoad):
+                    frame.move(pose.origin, pose.rotation)
         if geoms is not NO_GEOMS or self._geoms is not None:
             expect_pose_of_each(geoms, self._n_geoms)
             if self._geoms is not None:
                 self._geoms.move(geoms)
-        return self._tissue.step(sweep, dt)
+        released = [
+            (i, frame)
+            for i, frame in enumerate(self._frames)
+            if not isinstance(frame, FrameLoad) and frame.is_released
+        ]
+        result = self._tissue.step(sweep, dt)
+        for i, frame in released:
+            self._frames[i] = _load_on(frame)
+        return result
 
     def attach(self, attachment: FrameAttachment) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
@@ -255,12 +266,12 @@ class InProcessLink:
         if not 0 <= number < len(self._frames):
             raise ValueError(f"there is no frame {number}; there are {len(self._frames)}")
         frame = self._frames[number]
-        if frame.n_points:
+        if not isinstance(frame, FrameLoad) and frame.n_points:
             self._tissue.release(frame)
 
     def loads(self) -> Sequence[FrameLoad]:
         """Return what the body did to each frame in the last step."""
-        return [FrameLoad(frame.wrench, frame.n_points) for frame in self._frames]
+        return [_load_on(frame) for frame in self._frames]
 
     @property
     def n_driven(self) -> int:
@@ -353,3 +364,8 @@ def link_to(tissue: Tissue | TissueLink) -> TissueLink:
 def _is_link(candidate: object) -> TypeGuard[TissueLink]:
     """Return whether an object has the methods of a link. A `Tissue` does not describe itself."""
     return not isinstance(candidate, type) and hasattr(candidate, "describe")
+
+
+def _load_on(frame: Attachment | FrameLoad) -> FrameLoad:
+    """Return the load on a frame in the last step."""
+    return frame if isinstance(frame, FrameLoad) else FrameLoad(frame.wrench, frame.n_points)

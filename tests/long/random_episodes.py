@@ -27,6 +27,9 @@ MOST_SHORT = 60
 MOST_STEPS = 400
 """Control steps of one that goes on at most."""
 
+_LONGEST_FAULT = 60
+"""Characters of a fault by which it is counted."""
+
 N_REPEATED = 8
 """Control steps that are repeated from a state at most."""
 
@@ -130,7 +133,11 @@ def play(env: TissueEnv, case: int, tally: Counter[str] | None = None) -> None:
             after.append(_plain(done))
         tally["steps"] += 1
         if done[2] or done[3]:
-            tally["faults" if "fault" in done[4] else "terminated" if done[2] else "late"] += 1
+            fault = done[4].get("fault")
+            how = (
+                f"fault: {fault[:_LONGEST_FAULT]}" if fault else "terminated" if done[2] else "late"
+            )
+            tally[how] += 1
             break
     tally["episodes"] += 1
     tally[f"{policy.__name__} cut [mm2]"] += round(1e6 * env.episode.terms["cut_area"])

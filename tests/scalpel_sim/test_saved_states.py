@@ -66,6 +66,18 @@ def test_a_simulation_and_one_made_alike_go_on_from_a_state_with_the_same_bits(s
     assert other.touching.frames == simulation.touching.frames
 
 
+def test_a_state_after_a_release_goes_on_where_nothing_was_ever_held():
+    simulation = prepare(SLAB)
+    frame = simulation.bridge.attach("top", stiffness=10.0)
+    simulation.step()
+    simulation.bridge.release(frame)
+    simulation.step()
+    other = with_rows_of(simulation, SLAB)
+    other.load_state(SimulationState.from_bytes(simulation.save_state().to_bytes()))
+    assert simulation.link.loads()[0].n_points == other.link.loads()[0].n_points == 0
+    assert np.array_equal(go_on(other)[0], go_on(simulation)[0], equal_nan=True)
+
+
 def arrays_in(value):
     """Return the arrays in a constant."""
     if isinstance(value, np.ndarray):
