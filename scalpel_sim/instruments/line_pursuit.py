@@ -3,7 +3,9 @@
 Tissue dents under a blade, is dragged along by it and pushed aside. The tip of a stroke with a
 course is carried by what its line has moved: the blade goes on along the line as it lies, at the
 speed of the stroke, and the clock of the stroke stands where the line is above the tip. So the
-blade presses in until the skin is open, and goes on until it has passed the last of the line.
+blade presses in until the skin is open, and goes on until it has passed the last of the line. There
+it goes back with the tissue that it has dragged along: drawn out while that pulls at its edge, the
+tissue would spring back over it, and be cut beyond the line.
 """
 
 import math
@@ -84,6 +86,8 @@ class LastLook:
         """Tetrahedron that held each place, or -1."""
         self.moved: FloatArray = np.zeros((n, 3))
         """Displacement of each place since the stroke was planned [m]."""
+        self.before: FloatArray = np.zeros(3)
+        """That of the last place before the tip went along the line [m]."""
 
 
 class LinePursuit:
@@ -96,7 +100,7 @@ class LinePursuit:
     """
 
     def __init__(self, stroke: Stroke, link: TissueLink, progress: PursuitState) -> None:
-        self._path, self._link, self._progress = stroke.path, link, progress
+        self._stroke, self._link, self._progress = stroke, link, progress
         self._pursue = SameTypes(pursue)
 
     def go(self, part: int, course: SkinCourse, end: float, step: float) -> None:
@@ -113,11 +117,21 @@ class LinePursuit:
         if progress.now >= look.next:
             look.moved[:] = course.displacements(self._link, look.holders)
             look.next = progress.now + LOOK_EVERY
+            if progress.at < course.times[0]:
+                look.before[:] = look.moved[-1]
+        if progress.at >= course.times[-1]:
+            self._go_back(look, course)
         if step > 0.0:
-            clock, line = (progress.at, step, end), (self._path, course.times, look.moved)
+            clock, line = (progress.at, step, end), (self._stroke.path, course.times, look.moved)
             progress.at, progress.shift = self._pursue.call(
                 *clock, progress.shift, course.speed, *line
             )
+
+    def _go_back(self, look: LastLook, course: SkinCourse) -> None:
+        """Put the end of the line back along the line to where it was before the blade came."""
+        forward = self._stroke.pose(course.times[-1]).forward
+        dragged = float((look.moved[-1] - look.before) @ forward)
+        look.moved[-1] -= max(dragged, 0.0) * forward
 
     def leave(self, step: float) -> None:
         """Bring the tip back to the plan.

@@ -30,6 +30,14 @@ _TURN_OVER = 1.5e-3
 _GAP = 4e-3
 """Height above the skin at which the tip starts, and ends [m]: as that of an incision."""
 
+_BEYOND = 1e-3
+"""Way that the tip goes on beyond the line [m]: tissue at the edge gives way by about so much
+before it parts, so that the cut ends that far behind the edge."""
+
+_BACK = 0.01
+"""Way for which the blade has time at the end of the line, before it is drawn out [m]: it goes back
+as far as it has dragged the tissue along there, some 6 mm in liver."""
+
 _REACH, _LEAST_REACH = 3.0, 0.01
 """Length of the blade in depths, and at least above the skin [m]: tissue beside the edge rises."""
 
@@ -55,8 +63,8 @@ class _Leg(NamedTuple):
 
 @stroke_kind(
     "a cut along a line on the skin: the tip goes in along the edge at the first point, follows "
-    "the line, as it lies then, at one depth while the edge turns with it, and is drawn out at the "
-    "last",
+    "the line, as it lies then, at one depth while the edge turns with it, goes back with the "
+    "tissue that it has dragged along, and is drawn out",
     ("points",),
     ("depth", "edge", "length", "speed"),
     problem=missing_points,
@@ -75,7 +83,9 @@ def traced(row: StrokeTable, body: LyingBody) -> Stroke:
     skin = BodySkin.of(body.mesh, body.rest)
     rise = (depth + _GAP) * edge
     lines = lines_on_skin(np.array(row.points), skin, edge)
-    legs = [_leg(line.lying - depth * edge) for line in lines]
+    ways = [line.lying for line in lines]
+    ways[-1] = _beyond(ways[-1])
+    legs = [_leg(way - depth * edge) for way in ways]
     first, last = legs[0], legs[-1]
     into = _Leg(np.stack([first.tips[0] + rise, first.tips[0]]), first.forwards[[0, 0]])
     out = _Leg(np.stack([last.tips[-1], last.tips[-1] + rise]), last.forwards[[-1, -1]])
@@ -86,29 +96,39 @@ def traced(row: StrokeTable, body: LyingBody) -> Stroke:
         for tip, forward in zip(path.tips, path.forwards, strict=True)
     ]
     asked = [(0.0, path.begun[-1])]
-    course = _course(lines, path.begun[1:-1], row.tip_speed)
+    course = _course(lines, ways, path.begun[1:-1], row.tip_speed)
     return Stroke(path.times, poses, row.kind, asked=asked, course=course)
 
 
-def _course(lines: list[SkinLine], begun: list[float], speed: float) -> SkinCourse:
-    """Return where the skin is above the tip, and when.
+def _course(
+    lines: list[SkinLine], ways: list[FloatArray], begun: list[float], speed: float
+) -> SkinCourse:
+    """Return where the skin is above the tip, and when. Beyond the line that is its last place.
 
     Args:
         lines: The line on the skin, parted at its corners.
+        ways: The same as the tip goes, shape (n, 3) each.
         begun: When the tip begins to go along each [s].
         speed: Speed between the ramps [m/s].
     """
     whens = []
-    for line, begin in zip(lines, begun, strict=True):
-        along = _Leg(line.lying, line.lying).along
+    for way, begin in zip(ways, begun, strict=True):
+        along = _Leg(way, way).along
         times, done = timed(float(along[-1]), speed)
         whens.append(begin + np.interp(along, done, times))
+    last = lines[-1]
     return SkinCourse(
         np.concatenate(whens),
-        np.vstack([line.at_rest for line in lines]),
-        np.vstack([line.lying for line in lines]),
+        np.vstack([*(line.at_rest for line in lines), last.at_rest[-1:]]),
+        np.vstack([*(line.lying for line in lines), last.lying[-1:]]),
         speed,
     )
+
+
+def _beyond(line: FloatArray) -> FloatArray:
+    """Return a line that goes on straight by `_BEYOND`."""
+    way = line[-1] - line[-2]
+    return np.vstack([line, line[-1] + _BEYOND / np.linalg.norm(way) * way])
 
 
 def _leg(line: FloatArray) -> _Leg:
@@ -141,6 +161,8 @@ class _Path(NamedTuple):
 def _followed(legs: list[_Leg], speed: float) -> _Path:
     """Return the way along legs. Between them the tip rests, and the blade turns.
 
+    Before the last one it has time to go back.
+
     Args:
         legs: Each begins where the one before it ends.
         speed: Speed between the ramps [m/s].
@@ -148,9 +170,11 @@ def _followed(legs: list[_Leg], speed: float) -> _Path:
     times, tips, forwards = [np.zeros(1)], [legs[0].tips[:1]], [legs[0].forwards[:1]]
     begun = []
     for leg in legs:
-        now, turn = times[-1][-1:], seconds_to_turn(forwards[-1][-1], leg.forwards[0])
-        if turn > 0.0:
-            now = now + turn
+        now, rest = times[-1][-1:], seconds_to_turn(forwards[-1][-1], leg.forwards[0])
+        if leg is legs[-1]:
+            rest += _BACK / speed
+        if rest > 0.0:
+            now = now + rest
             times, tips, forwards = (
                 [*times, now],
                 [*tips, leg.tips[:1]],

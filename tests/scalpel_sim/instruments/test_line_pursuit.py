@@ -73,7 +73,7 @@ def test_a_cut_in_soft_tough_tissue_is_where_the_line_was_drawn(material, seed):
     assert [end.how for end in simulation.blade.progress.ends] == [AS_PLANNED]
     assert terms["covered"] > COVERED
     assert terms["depth_error"] < 1e-3
-    assert terms["off_plan"] < 0.2 * simulation.score.plan.area
+    assert terms["off_plan"] < 0.12 * simulation.score.plan.area
     stuff = simulation.link.describe().material
     assert stuff.toughness / stuff.young_modulus > 7e-3, "the tissue goes along by millimetres"
 
