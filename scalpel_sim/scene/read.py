@@ -53,6 +53,7 @@ TASK_SCENES = (
     "biopsy-v0",
     "dissect-v0",
     "excise-v0",
+    "expose-v0",
     "gallbladder-v0",
     "incise-v0",
     "incise_taut-v0",

@@ -82,6 +82,8 @@ class SuccessTable(TomlTable, kw_only=True, frozen=True):
     """Greatest force of any instrument [N]."""
     strain_above: NotNegative | None = None
     """Greatest volume that was stretched beyond its limit [m3]."""
+    held: Share | None = None
+    """Least share of the cut that was made while every grasper held tissue."""
     removed: Share | None = None
     """Least share of the target that is cut out."""
     healthy: NotNegative | None = None
@@ -205,6 +207,10 @@ def check_task(task: TaskTable | None, graspers: Sequence[str]) -> None:
         raise UsageError("[task] success has spared, and spare has no rows")
     if task.success.strain_above is not None and not any(each.strain for each in task.limits):
         raise UsageError("[task] success has strain_above, and no row of limits has a strain")
+    if task.success.held is not None and not graspers:
+        raise UsageError(
+            "[task] success has held, and the scene has no [[grasper]] that could hold"
+        )
     instruments = ("blade", *graspers)
     for i, row in enumerate(task.limits):
         _check_limit(row, f"[task] row {i + 1} of limits", instruments)

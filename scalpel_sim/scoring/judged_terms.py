@@ -86,6 +86,12 @@ _TEXTS = {
         "Volume of tissue that was stretched beyond its limit at any time.",
         _volume,
     ),
+    "held": _Text(
+        "Cut in held tissue",
+        "Share of the cut that was made while every grasper held tissue.",
+        _share,
+        is_least=True,
+    ),
     "removed": _Text(
         "Target cut out", "Share of the target that came away.", _share, is_least=True
     ),

@@ -18,7 +18,7 @@ from tissue import BoolArray, Snapshot, Tissue
 CONTROL_STEP = 0.02
 """Time from one look at the tissue to the next [s]: a control step of a hand or a policy."""
 
-_AT_LEAST = ("covered", "removed", "exposed")
+_AT_LEAST = ("covered", "held", "removed", "exposed")
 """Terms of which success asks for that much; of others for no more."""
 
 
@@ -49,6 +49,7 @@ class Score:
         self._graspers = tuple(zip(self.hands[1:], graspers, strict=True))
         self.cut = CutTerms(yardstick)
         """Terms of the cut."""
+        self._area_held = 0.0
         self._strains = tuple(StrainTerm(each) for each in yardstick.strains)
         self._look_at_strain()
         self._pieces = PiecesTerm(yardstick, body, simulation.link.n_pieces())
@@ -109,6 +110,8 @@ class Score:
             faces = self._link.cut_faces(since=self._n_faces)
             self._n_faces += faces.n
             self.cut.take(faces)
+            if all(each.holds for _, each in self._graspers):
+                self._area_held += float(faces.areas.sum())
             self._pieces.look(self._link)
         self._look_at_strain()
         self._look_at_target(simulation)
@@ -154,6 +157,8 @@ class Score:
             "time": self._time,
             "work": self._work[0],
         }
+        if self._graspers and self.cut.area > 0.0:
+            found["held"] = self._area_held / self.cut.area
         for each in hands:
             if each.can_hold:
                 found[f"{each.name}_held"] = each.held

@@ -90,6 +90,11 @@ def test_a_part_that_is_cut_out_has_a_name(tmp_path):
         scene_of(text, tmp_path)
 
 
+def test_success_of_held_tissue_needs_a_grasper(tmp_path):
+    with pytest.raises(UsageError, match=r"success has held, and the scene has no \[\[grasper\]\]"):
+        scene_of(f"{BODY}[task]\nsuccess = {{ held = 0.9 }}\n", tmp_path)
+
+
 @pytest.mark.parametrize("key", ["removed", "healthy", "exposed"])
 def test_success_of_a_target_needs_one(key, tmp_path):
     with pytest.raises(UsageError, match=f"success has {key} and no target"):

@@ -2,9 +2,11 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from scalpel_sim import prepare, scene_called
+from scalpel_sim.arm.grasper import HALF_PAD
 from scalpel_sim.cli.app import app, command_line
 from scalpel_sim.instruments.guarded_follower import ENDED
 from scalpel_sim.scene.read import (
@@ -14,7 +16,12 @@ from scalpel_sim.scene.read import (
     scene_in,
     shipped_path,
 )
+from scalpel_sim.scene.vary_table import OF_START
 from scalpel_sim.scene.write import scene_text
+from scalpel_sim.strokes.scene_stroke import stroke_through
+
+HALF_WIDTH = 5e-3
+"""Half the width of a grasper across its shaft and its opening, and of a jaw [m], at most."""
 
 REST = 0.1
 """Time after the strokes, in which what was cut comes to rest [s]."""
@@ -58,6 +65,27 @@ def test_a_task_that_is_written_reads_back_the_same(name, tmp_path):
     scene, path = scene_called(name), tmp_path / "scene.toml"
     path.write_text(scene_text(scene, path), encoding="utf-8")
     assert scene_in(read_scene_file(path)).settings() == scene.settings()
+
+
+@pytest.mark.parametrize("name", [n for n in TASK_SCENES if scene_called(n).graspers])
+def test_no_start_of_a_task_has_two_instruments_in_one_place(name):
+    scene = scene_called(name)
+    blade = stroke_through(scene.mesh(), scene.strokes).pose(0.0)
+    moved = {row.hand: np.zeros(3) for row in scene.vary if row.what in OF_START}
+    for row in scene.vary:
+        if row.what in OF_START:
+            moved[row.hand][OF_START.index(row.what)] = np.abs(row.range).max()
+    along_edge = np.linspace(blade.tip, blade.heel, 50)
+    for grasper in scene.graspers:
+        begins = grasper.motion[0]
+        ahead, across = np.array(begins.approach), np.array(begins.across)
+        axes = np.array([ahead, across, np.cross(ahead, across)])
+        from_pads = (along_edge - begins.at) @ axes.T
+        half = np.array([HALF_PAD, 0.5 * begins.opening + HALF_WIDTH, HALF_WIDTH])
+        beyond = np.abs(from_pads) - half
+        beyond[:, 0] = from_pads[:, 0] - HALF_PAD  # behind the jaws is the shaft
+        distance = np.linalg.norm(np.maximum(beyond, 0.0), axis=1).min()
+        assert distance > np.linalg.norm(sum(moved.values(), np.zeros(3)))
 
 
 def test_a_new_scene_may_be_that_of_a_task(tmp_path):

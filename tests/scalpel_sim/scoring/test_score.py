@@ -5,7 +5,14 @@ import json
 import pytest
 from msgspec import structs
 
-from scalpel_sim import SCENES, SimulationState, StrokeTable, WaypointTable, prepare
+from scalpel_sim import (
+    SCENES,
+    GrasperTable,
+    SimulationState,
+    StrokeTable,
+    WaypointTable,
+    prepare,
+)
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene.read import read_scene
 from scalpel_sim.scene.task_table import LimitTable, SpareTable, SuccessTable, TaskTable
@@ -140,6 +147,32 @@ def test_tearing_gains_nothing():
     assert 0.0 < terms["left_held"] < 0.8
     assert terms["force_above"] > 0.1
     assert score.failed() == ["covered", "strain_above"]
+
+
+def test_held_is_the_share_of_the_cut_that_was_made_while_the_grasper_held():
+    """The jaws close on a corner of the slab when a part of the cut is made already."""
+    at = (0.004, 0.056, 0.02)
+    motion = [
+        WaypointTable(time=0.0, at=at, approach=(0, -1, 0), across=(0, 0, 1), opening=0.05),
+        WaypointTable(time=1.0),
+        WaypointTable(time=1.2, opening=0.037),
+    ]
+    task = TaskTable(**{"line": TASK.line, "depth": 0.02, "success": SuccessTable(held=0.9)})
+    scene = slab(
+        task,
+        strokes=(StrokeTable(kind="points", **ALONG),),
+        graspers=(GrasperTable(name="left", motion=motion),),
+    )
+    simulation = prepare(scene, records=False, frame_seconds=0.02)
+    score, (left,) = simulation.score, simulation.graspers
+    held = area = 0.0
+    while simulation.time < simulation.duration:
+        simulation.step()
+        opened, area = simulation.result.cut_area - area, simulation.result.cut_area
+        held += opened * left.holds
+    assert 0.2 < held / area < 0.8
+    assert score.terms()["held"] == pytest.approx(held / area, abs=1e-3)
+    assert score.failed() == ["held"]
 
 
 def test_a_scene_of_several_bodies_is_scored_as_one(tmp_path):
