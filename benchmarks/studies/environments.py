@@ -12,7 +12,7 @@ from scalpel_sim.camera.gl_context import RenderError
 from scalpel_sim.learning import Episode, Expert, TissueVectorEnv
 from scalpel_sim.learning.episode import FULL, KINEMATIC
 from scalpel_sim.learning.images import ImageTaker
-from scalpel_sim.scene.observe_table import ObserveTable
+from scalpel_sim.scene.observe_table import CameraTable, ObserveTable
 from scalpel_sim.scene.read import TASK_SCENES, scene_called
 from scalpel_sim.scene.scene import Scene
 from scalpel_sim.scene.task_table import TaskTable
@@ -25,8 +25,14 @@ from tissue import FloatArray
 _BODIES = ("slab", "organ")
 """Scenes beside the tasks: a small and a large body."""
 
+_CAMERA = CameraTable(name="overview", size=(128, 128))
+"""Camera of a scene without a task."""
+
 _IN_ALL = Clock(CPU.name, time.process_time)
 """CPU time of all threads: those that draw an image, too."""
+
+_MOST_DRAWN = 50
+"""Control steps after which images are taken in a round, at most."""
 
 _N_ENVS = 4
 """Environments that one process has, or two share."""
@@ -84,31 +90,33 @@ def _time_episodes(rows: Rows, name: str, steps: int, runs: int) -> None:
     rates: dict[str, list[float]] = {arm: [] for arm in episodes}
     resets: list[FloatArray] = []
     images: list[FloatArray] = []
-    takers = _taker_of(rows, episodes[KINEMATIC], size)
+    taker = _taker_of(rows, episodes[KINEMATIC], size)
     with no_garbage_collection():
         for n in range(runs + 1):
             for arm, episode in episodes.items():
-                take = takers if arm == KINEMATIC else None
-                reset, taken, drawn = _episode_times(episode, n, steps, take)
+                reset, taken = _episode_times(episode, n, steps)
                 if n == 0:  # loads and compiles
                     continue
                 rates[arm].append(1.0 / float(taken.mean()))
                 if arm == KINEMATIC:
                     resets.append(np.array([reset]))
-                    images.append(drawn)
+            if n > 0 and taker is not None:
+                images.append(_image_times(episodes[KINEMATIC], n, steps, taker))
     for arm, title in ((KINEMATIC, "no arms"), (FULL, "whole arms")):
         rows.values(f"{name}: {title}", size, rates[arm], "steps/s", better=HIGHER, clock=CPU.name)
     ratios = np.array(rates[KINEMATIC]) / np.array(rates[FULL])
     rows.values(f"{name}: ratio of both", size, ratios.tolist(), "1", better=HIGHER, clock=CPU.name)
     rows.times(f"{name}: reset", size, resets)
-    if takers is not None:
-        takers.close()
+    if taker is not None:
+        taker.close()
         rows.times(f"{name}: images", size, images)
 
 
 def _as_task(scene: Scene) -> Scene:
-    """Return a scene with a task; one that has none gets one without conditions."""
-    return scene if scene.task is not None else structs.replace(scene, task=TaskTable())
+    """Return a scene with a task; one that has none gets one without conditions, and a camera."""
+    if scene.task is not None:
+        return scene
+    return structs.replace(scene, task=TaskTable(), observe=ObserveTable(cameras=(_CAMERA,)))
 
 
 def _taker_of(rows: Rows, episode: Episode, size: int) -> ImageTaker | None:
@@ -124,25 +132,35 @@ def _taker_of(rows: Rows, episode: Episode, size: int) -> ImageTaker | None:
     return taker
 
 
-def _episode_times(
-    episode: Episode, seed: int, steps: int, taker: ImageTaker | None
-) -> tuple[float, FloatArray, FloatArray]:
-    """Return the CPU time of a reset, of each control step of the expert, and of images [s]."""
+def _episode_times(episode: Episode, seed: int, steps: int) -> tuple[float, FloatArray]:
+    """Return the CPU time of a reset, and of each control step of the expert [s]."""
     rng = np.random.default_rng(seed)
     reset = _seconds(CPU, lambda: episode.reset(rng))
-    if taker is not None:
-        taker.begin()
-    expert, taken, drawn = Expert(episode), list[float](), list[float]()
+    expert, taken = Expert(episode), list[float]()
     for _ in range(steps):
         action = expert.action()
         begin = CPU.now()
         outcome = episode.act(action)
         taken.append(CPU.now() - begin)
-        if taker is not None:
-            drawn.append(_seconds(_IN_ALL, taker.take))
         if outcome.terminated or outcome.truncated:
             break
-    return reset, np.array(taken), np.array(drawn)
+    return reset, np.array(taken)
+
+
+def _image_times(episode: Episode, seed: int, steps: int, taker: ImageTaker) -> FloatArray:
+    """Return the CPU time of all images of each control step [s]; a pass of its own.
+
+    What draws takes the caches, and control steps between images would take longer.
+    """
+    episode.reset(np.random.default_rng(seed))
+    taker.begin()
+    expert, drawn = Expert(episode), list[float]()
+    for _ in range(min(steps, _MOST_DRAWN)):
+        outcome = episode.act(expert.action())
+        drawn.append(_seconds(_IN_ALL, taker.take))
+        if outcome.terminated or outcome.truncated:
+            break
+    return np.array(drawn)
 
 
 def _time_processes(rows: Rows, name: str, steps: int, runs: int) -> None:
