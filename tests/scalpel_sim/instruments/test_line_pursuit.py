@@ -78,6 +78,17 @@ def test_a_cut_in_soft_tough_tissue_is_where_the_line_was_drawn(material, seed):
     assert stuff.toughness / stuff.young_modulus > 7e-3, "the tissue goes along by millimetres"
 
 
+def test_the_blade_is_drawn_out_when_the_tissue_it_dragged_along_is_back():
+    simulation = prepare(piece_of("liver", line_across(1)), frame_seconds=0.01, records=False)
+    (_, drawn_out), largest = simulation.stroke.asked[-1], 0.0
+    while simulation.blade.progress.at < drawn_out:
+        simulation.step()
+        force = float(np.linalg.norm(simulation.blade.wrench.force))
+        largest = max(largest, force)
+    assert largest > 0.3, "it dragged some along"
+    assert force < 0.5 * largest
+
+
 @pytest.mark.kernel
 @settings(deadline=None)
 @given(st.lists(st.floats(-0.01, 0.01), min_size=3, max_size=3).map(tuple), st.floats(0.05, 0.9))
