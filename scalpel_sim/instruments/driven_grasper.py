@@ -20,6 +20,10 @@ _SPACING = 1e-3
 """Distance between the points that are looked for between the pads [m]: a fifth of the width of a
 pad. Farther apart they miss a thin edge; nearer they take time and hold the same."""
 
+_MOST_ACROSS = 5
+"""Points from pad to pad at most: tissue that is gripped reaches from one to the other. More take
+time and hold the same."""
+
 _ROUNDING = 1e-9
 """Barycentric weight below zero at which a point still is in a tetrahedron: else rounding leaves
 out points on the faces between two."""
@@ -220,6 +224,7 @@ def between_pads(
     """
     frame = frame_of(tissue, frame)
     counts = np.maximum(1, np.rint(2.0 * pads.half_size / _SPACING)).astype(int)
+    counts[0] = min(counts[0], _MOST_ACROSS)
     steps = [
         (np.arange(n) + 0.5) / n * 2.0 * half - half
         for n, half in zip(counts, pads.half_size, strict=True)

@@ -208,7 +208,8 @@ class Episode:
         simulation = self.simulation
         if self.fault is not None:
             raise UsageError("the simulation has failed in this episode: call reset()")
-        self.hand.obey(action, self._wrenches())
+        yields = self.act_table.force is not None
+        self.hand.obey(action, self._wrenches() if yields else {})
         self._felt.begin()
         try:
             with _unsaid():

@@ -32,9 +32,8 @@ class FeltWrench:
         simulation = self._simulation
         result = simulation.bridge.result
         axes = np.array(matrix_of(edge_rotation(simulation.blade.segment.numbers)))
-        to_tool = axes.reshape(3, 3).T
-        numbers = np.array(simulation.blade.wrench.numbers[:6]).reshape(2, 3)
-        self._total += np.concatenate([to_tool @ each for each in numbers])
+        numbers = np.array(simulation.blade.wrench.numbers[:6])
+        self._total += (numbers.reshape(2, 3) @ axes.reshape(3, 3)).ravel()
         self._n_frames += 1
         if result is not None:
             sizes = (math.hypot(*each.numbers[:3]) for each in (result.wrench, result.wrench_t1))

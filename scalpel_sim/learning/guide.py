@@ -25,6 +25,8 @@ class Guide:
     """
 
     def __init__(self, simulation: Simulation, plan: Plan) -> None:
+        self.plan = plan
+        """The plan."""
         points = plan.surface.points
         self._has_order = len(plan.stations) > 0
         if self._has_order:
@@ -34,6 +36,12 @@ class Guide:
         self._places = _nearest(points, wanted)
         self._link, self._rest = simulation.link, points[self._places]
         self._holders: IntArray = np.full(len(self._places), -1)
+        self._link.positions_of(self._rest, self._holders)
+        self._first_holders = self._holders.copy()
+
+    def begin(self) -> None:
+        """Begin another episode with this plan."""
+        self._holders[:] = self._first_holders
 
     @property
     def holders(self) -> IntArray:
@@ -58,5 +66,5 @@ class Guide:
 def _nearest(points: FloatArray, wanted: FloatArray) -> IntArray:
     """Return the points that are nearest to some places, each once, in the order of these."""
     # |p - w|^2 without |w|^2, which is the same for all points.
-    squares = (points**2).sum(axis=1) - 2.0 * np.einsum("wk,pk->wp", wanted, points)
+    squares = (points**2).sum(axis=1) - 2.0 * wanted @ points.T
     return np.array(list(dict.fromkeys(squares.argmin(axis=1).tolist())))

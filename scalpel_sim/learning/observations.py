@@ -85,6 +85,8 @@ class PlanView:
     def __init__(self, simulation: Simulation, score: Score) -> None:
         self._link, self._score, plan = simulation.link, score, score.plan
         assert plan is not None
+        self.plan = plan
+        """The plan."""
         self._rest = stations_of(plan)
         self._nearest = _nearest(plan.surface.points, self._rest, plan.into)
         self._areas = plan.surface.areas
@@ -92,6 +94,12 @@ class PlanView:
         self._into = plan.into
         self._depths = _depths(plan, self._rest, self._nearest)
         self._holders: IntArray = np.full(N_STATIONS, -1)
+        self._link.positions_of(self._rest, self._holders)
+        self._first_holders = self._holders.copy()
+
+    def begin(self) -> None:
+        """Begin another episode with this plan."""
+        self._holders[:] = self._first_holders
 
     def rows(self) -> FloatArray:
         """Return where the places are [m], and the share of the plan near each that is cut."""
@@ -137,7 +145,7 @@ def _nearest(points: FloatArray, stations: FloatArray, into: FloatArray) -> IntA
     """Return the nearest station of each place, as seen along the depth, shape (n,)."""
     seen = [each - np.outer(each @ into, into) for each in (points, stations)]
     # |p - s|^2 without |p|^2, which is the same for all stations.
-    squares = (seen[1] ** 2).sum(axis=1) - 2.0 * np.einsum("pk,sk->ps", *seen)
+    squares = (seen[1] ** 2).sum(axis=1) - 2.0 * seen[0] @ seen[1].T
     return np.asarray(squares.argmin(axis=1))
 
 
@@ -209,11 +217,13 @@ class Observer:
 
     def begin(self, sensor: Sensor) -> None:
         """Begin an episode."""
-        simulation = self._simulation
-        score = simulation.score
-        self._plan = None
-        if isinstance(score, Score) and score.plan is not None:
-            self._plan = PlanView(simulation, score)
+        score = self._simulation.score
+        if not isinstance(score, Score) or score.plan is None:
+            self._plan = None
+        elif self._plan is not None and self._plan.plan is score.plan:
+            self._plan.begin()
+        else:
+            self._plan = PlanView(self._simulation, score)
         self._sensor = sensor
         self.force, self.peak = np.zeros(6), 0.0
         self._shown_force = sensor.read(self.force)
@@ -282,9 +292,11 @@ class Observer:
         self._rows, self._now = None, self._edge()
         found = {key: self._made(key) for key in self.keys}
         self._last = self._now
-        return {
-            key: np.clip(each, *self._bounds[key]).astype(np.float32) for key, each in found.items()
-        }
+        shown: dict[str, FloatArray] = {}
+        for key, each in found.items():
+            low, high = self._bounds[key]
+            shown[key] = np.minimum(np.maximum(each, low), high).astype(np.float32)
+        return shown
 
     def _made(self, key: str) -> FloatArray:
         if key in self._makers:
@@ -343,7 +355,8 @@ def _places(n: int, names: tuple[str, ...]) -> Shown:
 
 def _canonical(rotation: FloatArray) -> FloatArray:
     """Return a quaternion, or its negative, whose first number that is not 0 is positive."""
-    return -rotation if rotation[np.flatnonzero(rotation)[0]] < 0.0 else rotation
+    first = next(each for each in rotation.tolist() if each != 0.0)
+    return -rotation if first < 0.0 else rotation
 
 
 def _quaternion(axes: FloatArray) -> FloatArray:

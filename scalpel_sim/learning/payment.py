@@ -21,12 +21,18 @@ class Payment:
         assert isinstance(score, Score)
         self._success, self._score, self._simulation = task.reward.success, score, simulation
         self._weights = task.reward.weights()
+        self._guide: Guide | None = None
         self.begin()
 
     def begin(self) -> None:
         """Begin an episode: nothing is done yet."""
-        plan, is_guided = self._score.plan, "approach" in self._weights
-        self._guide = Guide(self._simulation, plan) if plan is not None and is_guided else None
+        plan = self._score.plan
+        if plan is None or "approach" not in self._weights:
+            self._guide = None
+        elif self._guide is not None and self._guide.plan is plan:
+            self._guide.begin()
+        else:
+            self._guide = Guide(self._simulation, plan)
         self._potential = self._weighted()
         self.is_success = False
         """Whether all conditions of success held after the last control step."""

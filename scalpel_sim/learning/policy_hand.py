@@ -146,12 +146,13 @@ class PolicyHand(Teleoperation):
             n = max(n, of_this)
         return n
 
-    def obey(self, action: FloatArray, wrenches: dict[str, Wrench]) -> None:
+    def obey(self, action: FloatArray, wrenches: Mapping[str, Wrench]) -> None:
         """Do an action over the next control step.
 
         Args:
             action: Numbers in [-1, 1], in the order of `action_names`; others are clipped.
-            wrenches: Wrench on each instrument that is led, world frame.
+            wrenches: Wrench on each instrument that is led, world frame; it is used where the
+                force of an action is limited.
         """
         action = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         act, at = self._act, 0

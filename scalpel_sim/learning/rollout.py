@@ -12,6 +12,9 @@ from tissue import FloatArray
 Policy = Callable[[], FloatArray]
 """Returns the next action."""
 
+PolicyMaker = Callable[[Episode, np.random.Generator], Policy]
+"""Makes the policy of an episode after its `reset`, with a generator of its own."""
+
 LONGEST_EPISODE = 2_000
 """Control steps after which an episode of a task without a time limit ends."""
 
@@ -50,7 +53,7 @@ def idle(episode: Episode, rng: np.random.Generator) -> Policy:
     return lambda: np.zeros(n)
 
 
-POLICIES: dict[str, Callable[[Episode, np.random.Generator], Policy]] = {
+POLICIES: dict[str, PolicyMaker] = {
     "expert": expert,
     "random": uniform,
     "idle": idle,
@@ -58,9 +61,7 @@ POLICIES: dict[str, Callable[[Episode, np.random.Generator], Policy]] = {
 """Policies by name: each is made for an episode after its `reset`."""
 
 
-def run_episode(
-    episode: Episode, policy: Callable[[Episode, np.random.Generator], Policy], seed: int
-) -> EpisodeEnd:
+def run_episode(episode: Episode, policy: PolicyMaker, seed: int) -> EpisodeEnd:
     """Do a whole episode.
 
     Args:

@@ -11,6 +11,7 @@ from scalpel_sim.errors import unknown
 from scalpel_sim.scene.schema import ViewTable
 from scalpel_sim.scoring.sampled_surface import parts_of_triangles
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.vectors import cross_rows
 from tissue import BoolArray, FloatArray, IntArray, MaterialPoints, Snapshot, Tissue, boundary_faces
 
 _PLACES = 200
@@ -23,6 +24,12 @@ and nobody sees a micrometre."""
 _COVER = 1e-4
 """Distance before a place at which a triangle hides it [m]: twice the depth to which bodies that
 lie on each other press in; a place that is seen is `_INSIDE` behind its own triangle."""
+
+_SAME_PLACE = 1e-9
+"""Distance in a picture that is rounding, over the size of the target in it."""
+
+_BITS = np.array([1, 2])
+"""Bits of two sides of a rectangle."""
 
 _DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 """Groups of geoms that cameras see, as MuJoCo's viewers have them."""
@@ -125,14 +132,15 @@ class Exposure:
         n = len(outside.triangle)
         points = tissue.positions_of(self._points) - sight.eye
         places, corners = points[:n], points[n:].reshape(-1, 3, 3)
-        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        sides = cross_rows(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         distances = np.linalg.norm(places, axis=1)
         facing = -(sides[outside.triangle] * places).sum(axis=1)
         angles = outside.shares * np.maximum(facing, 0.0) / distances**3
         surface = tissue.surface()
         hides, triangle = hiding(places, surface.positions - sight.eye, surface.triangles)
         assert surface.labels is not None
-        is_own = np.isin(surface.labels[triangle], outside.labels)
+        labels = surface.labels[triangle]
+        is_own = (labels[:, None] == outside.labels).any(axis=1)
         angles[hides[:, is_own].any(axis=1)] = 0.0
         whole = float(angles.sum())
         if whole == 0.0:
@@ -174,7 +182,8 @@ def hiding(
 ) -> tuple[BoolArray, IntArray]:
     """Return which triangles hide which places from an eye at the origin.
 
-    What a ray enters first faces the eye, so only such triangles are looked at.
+    What a ray enters first faces the eye, so only such triangles are looked at; and of them only
+    those that are before some place as the eye sees it.
 
     Args:
         places: Where they are [m], shape (n, 3).
@@ -184,18 +193,43 @@ def hiding(
     Returns:
         Whether each hides each place, shape (n, m), and which triangles these are, shape (m,).
     """
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    over = np.cross(b, c)
+    before = np.flatnonzero(_may_be_before(places, vertices, triangles))
+    a, b, c = (vertices[triangles[before, i]] for i in range(3))
+    over = cross_rows(b, c)
     # Six times the volume between eye and triangle: below 0 where its outside faces the eye.
     volumes = (a * over).sum(axis=1)
-    chosen = np.flatnonzero(volumes < 0.0)
-    a, b, c, volumes = a[chosen], b[chosen], c[chosen], volumes[chosen]
-    sides = [places @ each.T for each in (over[chosen], np.cross(c, a), np.cross(a, b))]
+    facing = np.flatnonzero(volumes < 0.0)
+    a, b, c, volumes = a[facing], b[facing], c[facing], volumes[facing]
+    sides = [places @ each.T for each in (over[facing], cross_rows(c, a), cross_rows(a, b))]
     hides = (sides[0] <= 0.0) & (sides[1] <= 0.0) & (sides[2] <= 0.0)
     # The ray meets it at volume / whole of the way to the place.
     whole = sides[0] + sides[1] + sides[2]
     hides &= whole * (1.0 - _COVER / np.linalg.norm(places, axis=1))[:, None] < volumes
-    return hides, chosen
+    return hides, before[facing]
+
+
+def _may_be_before(places: FloatArray, vertices: FloatArray, triangles: IntArray) -> BoolArray:
+    """Return which triangles may be on a ray to a place; see `hiding`. Shape (n_triangles,).
+
+    The picture of a triangle is within the rectangle around those of its corners. Triangles that
+    are not wholly before the eye have no such picture: of them none is left out.
+    """
+    forward = places.mean(axis=0)
+    right = cross_rows(forward, np.eye(3)[np.argmin(np.abs(forward))])
+    axes = np.stack([right, cross_rows(right, forward), forward], axis=1)
+    seen, of_places = vertices @ axes, places @ axes
+    if not (of_places[:, 2] > 0.0).all():
+        return np.ones(len(triangles), np.bool_)
+    is_ahead = seen[:, 2] > 0.0
+    pictures = seen[:, :2] / np.where(is_ahead, seen[:, 2], 1.0)[:, None]
+    of_places = of_places[:, :2] / of_places[:, 2:]
+    low, high = of_places.min(axis=0), of_places.max(axis=0)
+    margin = _SAME_PLACE * (high - low)
+    # A bit for each side of the rectangle on which a corner is.
+    sides = (pictures < low - margin) @ _BITS + (pictures > high + margin) @ (4 * _BITS)
+    sides[~is_ahead] = 0
+    common = sides[triangles[:, 0]] & sides[triangles[:, 1]] & sides[triangles[:, 2]]
+    return np.asarray(common == 0)
 
 
 def _hidden_by_arms(

@@ -16,6 +16,7 @@ from scalpel_sim.strokes.csv_lines import StrokeError, numbered_lines, numbers_o
 from scalpel_sim.strokes.stroke import FASTEST, Stroke
 from scalpel_sim.strokes.timing import SAMPLE
 from scalpel_sim.tables.values import WIDEST_OPENING
+from scalpel_sim.vectors import cross_rows
 from tissue import BladeSegment, FloatArray
 
 GRASP_COLUMNS = (
@@ -165,7 +166,7 @@ def _pose(waypoint: Waypoint, name: str) -> _Pose:
     """Return a waypoint as position and rotation."""
     y, x = np.array(waypoint.approach, float), np.array(waypoint.across, float)
     sizes = np.linalg.norm(y), np.linalg.norm(x)
-    z = np.cross(x, y)
+    z = cross_rows(x, y)
     if not np.linalg.norm(z) > _LEAST_SINE * sizes[0] * sizes[1]:
         raise StrokeError(
             f"the motion of '{name}' at {waypoint.time:g} s: approach {list(waypoint.approach)} "
@@ -173,7 +174,7 @@ def _pose(waypoint: Waypoint, name: str) -> _Pose:
         )
     y, z = y / sizes[0], z / np.linalg.norm(z)
     turn = np.empty(4)
-    mujoco.mju_mat2Quat(turn, np.stack([np.cross(y, z), y, z], axis=1).ravel())
+    mujoco.mju_mat2Quat(turn, np.stack([cross_rows(y, z), y, z], axis=1).ravel())
     return _Pose(np.array(waypoint.at, float), turn)
 
 

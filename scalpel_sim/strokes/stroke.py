@@ -10,6 +10,7 @@ import numpy as np
 from scalpel_sim.strokes.csv_lines import StrokeError, numbered_lines, numbers_of
 from scalpel_sim.strokes.guard import Guard
 from scalpel_sim.strokes.skin_course import SkinCourse
+from scalpel_sim.vectors import cross_rows
 from tissue import BladeSegment, FloatArray
 
 _SAME_LENGTH = 0.01
@@ -220,7 +221,7 @@ def _quaternions(edges: FloatArray, forwards: FloatArray) -> FloatArray:
     """
     across = forwards - (forwards * edges).sum(axis=1, keepdims=True) * edges
     backs = -across / np.linalg.norm(across, axis=1, keepdims=True)
-    axes = np.stack([np.cross(edges, backs), edges, backs], axis=2)
+    axes = np.stack([cross_rows(edges, backs), edges, backs], axis=2)
     quaternions = np.empty((len(edges), 4))
     for quaternion, matrix in zip(quaternions, axes, strict=True):
         mujoco.mju_mat2Quat(quaternion, matrix.ravel())

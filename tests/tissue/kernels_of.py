@@ -212,7 +212,7 @@ class Network(NamedTuple):
         context = context.replaced(surroundings=undamped, damping=damping)
         take_steps(context, method, NOWHERE, n * h, 0.0, 1.0, n)
         if not is_running:
-            damp(context, 0.0, False)
+            damp(context, 0.0, n * h, False)
         return damping
 
     def advance(self, h: float, n: int = 1) -> None:

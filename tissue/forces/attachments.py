@@ -1,8 +1,9 @@
 """Attachments: springs and dampers from material points to others, or to what moves from outside.
 
 They act in every stage of a step, like the blade: what holds tissue firmly would be unstable with
-forces that stay for a millisecond. The springs of a body's points add to the frequencies of its
-nodes,
+forces that stay for a millisecond. Dampers of points that are held in all directions are the
+exception: they act between steps (`tissue.forces.attachment_dampers`). The springs of a body's
+points add to the frequencies of its nodes,
 
     K = sum_p k_p w_p w_p^T,   w^2 <= max_i (sum_p k_p w_pi) / m_i,
 
@@ -17,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, lerp, norm, scale, store, sub, vec3
 
@@ -119,7 +120,7 @@ def no_attachments(n: int = 0) -> Attachments:
     )
 
 
-@kernel
+@inlined
 def attached_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Vec3:
     """Return what nodes have, such as positions [m], at point `p`."""
     x = Vec3(0.0, 0.0, 0.0)
@@ -128,7 +129,7 @@ def attached_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Ve
     return x
 
 
-@kernel
+@inlined
 def other_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Vec3:
     """Return what nodes have at the other end of a tie, point `p`."""
     x = Vec3(0.0, 0.0, 0.0)
@@ -138,7 +139,7 @@ def other_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Vec3:
     return x
 
 
-@kernel
+@inlined
 def other_end(attachments: Attachments, p: int, positions: FloatArray, when: float) -> Vec3:
     """Return where the other end of what holds point `p` is [m].
 
@@ -161,7 +162,7 @@ def end_after_step(attachments: Attachments, p: int, positions: FloatArray) -> V
     return vec3(attachments.end, p)
 
 
-@kernel
+@inlined
 def other_motion(attachments: Attachments, p: int, velocities: FloatArray, dt: float) -> Vec3:
     """Return how far the other end of what holds point `p` moves in a time step `dt` [m]."""
     if attachments.is_tie[p] == 1:
@@ -177,7 +178,7 @@ def pull_other_end(attachments: Attachments, p: int, force: Vec3, external: Floa
         store(external, node, axpy(weight, force, vec3(external, node)))
 
 
-@kernel
+@inlined
 def spread_force(attachments: Attachments, p: int, force: Vec3, external: FloatArray) -> None:
     """Add a force on point `p` [N] to those on the nodes around it."""
     for q in range(4):
@@ -223,10 +224,13 @@ def add_attachment_forces(
         if attachments.state[p] != STRAIGHT:
             continue
         x = attached_point(attachments, p, positions)
-        v = attached_point(attachments, p, velocities)
         path = sub(other_end(attachments, p, positions, when), x)
         of_end = other_motion(attachments, p, velocities, dt)
-        pull = _pull(attachments, p, path, axpy(-dt, v, of_end), dt)
+        if is_held_all_round(attachments, p):
+            pull = _Pull(scale(attachments.stiffness[p], path), 0.0)
+        else:
+            v = attached_point(attachments, p, velocities)
+            pull = _pull_along(attachments, p, path, axpy(-dt, v, of_end), dt)
         seconds = share * dt
         count_impulse(attachments, p, x, scale(seconds, pull.force))
         if attachments.is_tie[p] == 1:
@@ -237,15 +241,21 @@ def add_attachment_forces(
         spread_force(attachments, p, pull.force, external)
 
 
-@kernel
+@inlined
 def count_impulse(attachments: Attachments, p: int, at: Vec3, impulse: Vec3) -> None:
     """Count an impulse of what point `p` is attached to [N s], which acts at a place [m]."""
     store(attachments.impulse, p, add(vec3(attachments.impulse, p), impulse))
     store(attachments.turn, p, add(vec3(attachments.turn, p), cross(at, impulse)))
 
 
+@kernel
+def is_held_all_round(attachments: Attachments, p: int) -> bool:
+    """Return whether a spring without slack holds point `p` in all directions: it is no fibre."""
+    return bool(attachments.length[p] == 0.0 and attachments.section[p] == 0.0)
+
+
 class _Pull(NamedTuple):
-    """Force and loss of a spring and its damper."""
+    """Force and loss of a spring, and of a damper that acts along it."""
 
     force: Vec3
     """Force on the point [N]."""
@@ -254,8 +264,8 @@ class _Pull(NamedTuple):
 
 
 @kernel
-def _pull(attachments: Attachments, p: int, path: Vec3, motion: Vec3, dt: float) -> _Pull:
-    """Return the force on point `p`, and what its damper takes.
+def _pull_along(attachments: Attachments, p: int, path: Vec3, motion: Vec3, dt: float) -> _Pull:
+    """Return the force of a string on point `p`, and what its damper takes.
 
     Args:
         attachments: Stiffness, damping and slack.
@@ -264,11 +274,7 @@ def _pull(attachments: Attachments, p: int, path: Vec3, motion: Vec3, dt: float)
         motion: How far that moves ahead of the point in the time step [m].
         dt: Length of the time step [s].
     """
-    stiffness, damping = attachments.stiffness[p], attachments.damping[p]
-    if attachments.length[p] == 0.0 and attachments.section[p] == 0.0:
-        drag = scale(damping / dt, motion)
-        return _Pull(add(scale(stiffness, path), drag), dot(drag, motion) / dt)
-    length = norm(path)
+    stiffness, length = attachments.stiffness[p], norm(path)
     if length <= attachments.length[p]:
         return _Pull(Vec3(0.0, 0.0, 0.0), 0.0)
     rate = dot(motion, path) / (length * dt)
@@ -330,7 +336,7 @@ def frequency_squared(
     """Return what attachments add to w^2 of the body at most [1/s2].
 
     A damper of rate r adds 2 r w at most where the step is bounded by w: it is counted as the
-    spring that is as fast in a step of `_STABLE` / w.
+    spring that is as fast in a step of `_STABLE` / w. Those that act between steps add nothing.
 
     Args:
         attachments: Springs and dampers.
@@ -341,9 +347,9 @@ def frequency_squared(
     if not len(attachments.nodes):
         return 0.0
     stiffness = attachments.stiffness * (1.0 if stiffening is None else stiffening)
-    springs, dampers = (
-        _largest_rate(attachments, each, masses) for each in (stiffness, attachments.damping)
-    )
+    is_string = (attachments.length > 0.0) | (attachments.section > 0.0)
+    damping = attachments.damping * is_string
+    springs, dampers = (_largest_rate(attachments, each, masses) for each in (stiffness, damping))
     # h^2 springs + 2 h dampers = s^2 gives the step; its (s / h)^2 is what is added.
     s = _STABLE
     step = s * s / (dampers + math.sqrt(dampers * dampers + s * s * springs))

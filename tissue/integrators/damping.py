@@ -30,6 +30,7 @@ from tissue.elasticity.gradients import keeps_gradients
 from tissue.elasticity.neo_hookean import has_averages
 from tissue.elasticity.viscoelasticity import prepare_relaxation
 from tissue.elasticity.viscous_stress import is_viscous
+from tissue.forces.attachment_dampers import change_by_dampers
 from tissue.forces.rigid_motion import add_rigid_part
 from tissue.forces.step_context import Damping, Stages, StepContext
 from tissue.forces.supports import add_support_damping
@@ -81,7 +82,7 @@ def change_velocities(damping: Damping, body: Body, stages: Stages) -> None:
 
 
 @kernel
-def damp_if_due(context: StepContext, method: int, i: int, n: int, h: float) -> None:
+def damp_if_due(context: StepContext, method: int, i: int, n: int, h: float, dt: float) -> None:
     """Apply the damping between steps, before a step, if it is due.
 
     Args:
@@ -90,30 +91,35 @@ def damp_if_due(context: StepContext, method: int, i: int, n: int, h: float) -> 
         i: The step, from 0 on.
         n: Number of steps in this part of the time step.
         h: Length of a step [s].
+        dt: Length of the time step [s].
     """
     interval = context.damping.interval
     if i % interval == 0:
-        damp(context, min(interval, n - i) * h, _GRADIENTS[method] == OF_NEXT_STEP)
+        damp(context, min(interval, n - i) * h, dt, _GRADIENTS[method] == OF_NEXT_STEP)
 
 
 @kernel
-def damp(context: StepContext, h: float, begins_here: bool) -> None:
+def damp(context: StepContext, h: float, dt: float, begins_here: bool) -> None:
     """Apply half of the damping of the last steps, and half of that of the steps to come.
 
     Args:
         context: What takes part.
         h: Length of the step to come, or of the two steps [s].
+        dt: Length of the time step [s].
         begins_here: Whether that step begins with forces where the body is now.
     """
     damping = context.damping
     seconds = damping.owed + 0.5 * h
     damping.owed = 0.5 * h
-    if damping.retardation_time > 0.0 or damping.drag > 0.0:
+    has_dampers = len(context.attachments.nodes) > 0
+    if damping.retardation_time > 0.0 or damping.drag > 0.0 or has_dampers:
         if damping.retardation_time > 0.0 and is_viscous(context.elastic.viscosity):
             _resist(context, begins_here)
         run_loop(context, DAMPING_CHANGES, seconds)
         factor, change = seconds * damping.drag, context.stages.change
         add_rigid_part(context.body, context.loose, context.body.velocities, factor, change)
+        if has_dampers:
+            change_by_dampers(context, seconds, dt)
         change_cores_as_one(context, change)
         if context.supports.is_moving == 1:
             add_support_damping(context, seconds)

@@ -155,7 +155,7 @@ def take_steps(
     share = (end - begin) / n
     for i in range(n):
         at = begin + i * share
-        damp_if_due(context, method, i, n, share * dt)
+        damp_if_due(context, method, i, n, share * dt, dt)
         _take_step(context, method, edge, dt, at, share)
         end_substep(context, edge, dt, share, at + share)
         if context.geoms.n_contacts > 0:

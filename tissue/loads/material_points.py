@@ -97,6 +97,8 @@ def locate_points(body: Body, rest: FloatArray, tetrahedra: IntArray, weights: F
             depth = _depth(body, rest, k, t)
             if depth > deepest:
                 deepest, held = depth, t
+            if depth > INSIDE_TOLERANCE:  # and so in no other
+                break
         tetrahedra[k] = held
         w = barycentric_in(p, body.rest, body.tetrahedra, held)
         for i in range(4):

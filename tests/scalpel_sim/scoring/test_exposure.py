@@ -13,7 +13,7 @@ from scalpel_sim.runs.file_names import SUMMARY
 from scalpel_sim.scene.body import OneOfBodiesTable
 from scalpel_sim.scene.schema import LabelTable, ViewTable
 from scalpel_sim.scene.task_table import SuccessTable, TaskTable
-from scalpel_sim.scoring.exposure import Exposure, TaskCamera
+from scalpel_sim.scoring.exposure import Exposure, TaskCamera, hiding
 from tests.scalpel_sim.hands.driven_runs import done
 from tests.scalpel_sim.served_scenes import served
 
@@ -95,6 +95,28 @@ def test_rays_see_the_share_that_a_picture_shows(simulation, view):
     found = exposure(simulation, view)
     assert found == pytest.approx(share_of_pixels(simulation, view), abs=0.02)
     assert found > 0.2
+
+
+def test_each_triangle_that_faces_the_eye_hides_what_a_ray_meets_behind_it():
+    """Each ray and triangle by three equations, wherever the triangle is around the eye."""
+    rng = np.random.default_rng(3)
+    places = np.array([0.3, -0.2, 1.0]) + rng.uniform(-0.2, 0.2, (40, 3))
+    corners = 0.3 * places[rng.integers(0, 40, 300)][:, None] + rng.normal(0.0, 0.1, (300, 3, 3))
+    corners[::3] = rng.normal(0.0, 1.0, (100, 3, 3))  # in any direction
+    hides, triangle = hiding(places, corners.reshape(-1, 3), np.arange(900).reshape(-1, 3))
+    found = np.zeros((40, 300), bool)
+    found[:, triangle] = hides
+    expected = np.zeros_like(found)
+    for t, (a, b, c) in enumerate(corners):
+        if a @ np.cross(b - a, c - a) >= 0.0:
+            continue
+        for i, place in enumerate(places):
+            along, to_b, to_c = np.linalg.solve(np.stack([place, a - b, a - c], axis=1), a)
+            is_within = to_b >= 0.0 and to_c >= 0.0 and to_b + to_c <= 1.0
+            before = 1.0 - 1e-4 / np.linalg.norm(place)
+            expected[i, t] = is_within and 0.0 < along < before
+    assert expected.any(axis=0).sum() > 50
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_an_arm_hides_what_is_behind_it(simulation):

@@ -109,6 +109,33 @@ def test_the_account_of_energy_closes_with_a_frame_that_moves():
     assert abs(energies.residual) < 5e-3 * energies.work_of_loads
 
 
+def test_dampers_bring_a_body_to_the_speed_of_its_frame_at_their_own_rate():
+    """v = u (1 - exp(-d t / m)) where they act on all of a body that nothing else holds."""
+    tissue, speed, seconds = cube("none"), 0.01, 0.2
+    body = tissue.snapshot()
+    mass = float(body.masses.sum())
+    damping = 1.5 * mass / seconds
+    grip = tissue.attach(np.full(len(body.masses), True), stiffness=1e-6, damping=damping)
+    for _ in range(round(seconds / DT)):
+        grip.move(grip.wrench.point + by(0, 0, speed * DT))
+        tissue.step(None, DT)
+    after = tissue.snapshot()
+    mean = float(after.masses @ after.velocities[:, 2]) / mass
+    assert mean == pytest.approx(speed * (1.0 - np.exp(-1.5)), rel=0.02)
+
+
+def test_strong_dampers_take_no_more_steps_and_stay_stable():
+    steps = []
+    for damping in (0.0, 1e3):
+        tissue = cube()
+        grip = tissue.attach(TOP, stiffness=100.0, damping=damping)
+        grip.move(grip.wrench.point + by(1e-4, 0, 1e-4))
+        steps.append(tissue.step(None, 0.02).n_substeps)
+        settled(tissue, 0.1)
+        assert np.abs(tissue.snapshot().velocities).max() < 1e-2
+    assert steps[0] == steps[1]
+
+
 def test_very_stiff_attachments_take_more_steps_and_stay_stable():
     soft, stiff = cube(), cube()
     soft.attach(TOP, stiffness=100.0)
