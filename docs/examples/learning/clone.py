@@ -29,6 +29,9 @@ with contextlib.suppress(ImportError):
 PIXELS = 64
 """Width and height at which a policy looks at images."""
 
+BATCH = 128
+"""Steps of demonstrations that are learnt from at once."""
+
 OF_TISSUE = ("target", "depth", "points")
 """Beginnings of the names of what no arm knows."""
 
@@ -138,7 +141,7 @@ def learn(policy: Policy, shown: Shown, options: argparse.Namespace) -> None:
     order = torch.Generator().manual_seed(options.seed)
     every, total = max(options.steps // 10, 1), 0.0
     for step in range(1, options.steps + 1):
-        some = torch.randint(len(seen), (256,), generator=order)
+        some = torch.randint(len(seen), (BATCH,), generator=order)
         wanted = policy(seen[some], None if images is None else images[some])
         loss = nn.functional.mse_loss(wanted, actions[some])
         optimizer.zero_grad()
@@ -194,7 +197,7 @@ def main() -> None:
     parser.add_argument("--task", default="scalpel_sim/Incise-v0")
     parser.add_argument("--obs", choices=("state", "images"), default="state")
     parser.add_argument("--episodes", type=int, default=200, help="demonstrations")
-    parser.add_argument("--tremble", type=float, default=0.1, help="noise of the expert's hand")
+    parser.add_argument("--tremble", type=float, default=0.2, help="noise of the expert's hand")
     parser.add_argument("--steps", type=int, default=10_000, help="steps of training")
     parser.add_argument("--evaluate", type=int, default=50, help="episodes")
     parser.add_argument("--seed", type=int, default=0)

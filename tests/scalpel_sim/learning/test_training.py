@@ -65,6 +65,13 @@ def test_ppo_trains_and_saves_its_policy(trained, tmp_path):
     assert (tmp_path / "ppo.pt").stat().st_size > 10_000
 
 
+def test_ppo_goes_on_from_a_clone(trained):
+    options = ("--demonstrations", "1", "--steps", "256", "--round", "64", "--envs", "2")
+    printed = trained("ppo.py", *options)
+    assert re.match(r"the clone: [01] of 1$", printed, re.MULTILINE)
+    assert interval(printed)[1] == 1
+
+
 def test_stable_baselines_trains_and_saves_its_policy(trained, tmp_path):
     pytest.importorskip("stable_baselines3", reason="pip install '.[examples]'")
     printed = trained("sb3.py", "--steps", "600", "--round", "600", "--envs", "2")
