@@ -32,6 +32,9 @@ PIXELS = 64
 BATCH = 128
 """Steps of demonstrations that are learnt from at once."""
 
+N_LOOKED, TELLS = 64, 0.3
+"""Numbers that an eye makes of images, and weight of its errors about what they show."""
+
 OF_TISSUE = ("target", "depth", "points")
 """Beginnings of the names of what no arm knows."""
 
@@ -51,6 +54,12 @@ def numbers(seen: dict[str, np.ndarray], obs: str) -> np.ndarray:
     return np.concatenate(list(rows.values()))
 
 
+def hidden(seen: dict[str, np.ndarray]) -> np.ndarray:
+    """Return what a policy that is shown images is to make out in them, in one row."""
+    rows = [each for name, each in seen.items() if name.startswith(OF_TISSUE)]
+    return np.concatenate(rows) if rows else np.zeros(0, np.float32)
+
+
 def image(seen: dict[str, np.ndarray]) -> np.ndarray:
     """Return the colours of all cameras, one above the other, shape (3 n, PIXELS, PIXELS)."""
     found = []
@@ -68,12 +77,12 @@ class Policy(nn.Module):
         self.sizes = (n_seen, n_actions, channels)
         self.register_buffer("mean", torch.zeros(n_seen))
         self.register_buffer("scale", torch.ones(n_seen))
-        n_of_image = 64 if channels else 0
+        n_of_image = N_LOOKED if channels else 0
         self.look = nn.Sequential(
             nn.Conv2d(max(channels, 1), 16, 5, 2, 2), nn.ReLU(),
             nn.Conv2d(16, 32, 3, 2, 1), nn.ReLU(),
             nn.Conv2d(32, 32, 3, 2, 1), nn.ReLU(),
-            nn.Flatten(), nn.Linear(32 * (PIXELS // 8) ** 2, 64), nn.ReLU(),
+            nn.Flatten(), nn.Linear(32 * (PIXELS // 8) ** 2, N_LOOKED), nn.ReLU(),
         )  # fmt: skip
         self.act = nn.Sequential(
             nn.Linear(n_seen + n_of_image, 256), nn.ReLU(),
@@ -82,10 +91,12 @@ class Policy(nn.Module):
         )  # fmt: skip
 
     def forward(self, seen: torch.Tensor, images: torch.Tensor | None = None) -> torch.Tensor:
+        return self.acted(seen, None if images is None else self.look(images.float() / 255.0))
+
+    def acted(self, seen: torch.Tensor, looked: torch.Tensor | None) -> torch.Tensor:
+        """Return the actions where images were looked at so."""
         given = (seen - self.mean) / self.scale
-        if images is not None:
-            given = torch.cat([given, self.look(images.float() / 255.0)], dim=1)
-        return self.act(given)
+        return self.act(given if looked is None else torch.cat([given, looked], dim=1))
 
 
 class Shown:
@@ -95,16 +106,18 @@ class Shown:
         self.obs = obs
         self.seen: list[np.ndarray] = []
         self.images: list[np.ndarray] = []
+        self.hidden: list[np.ndarray] = []
         self.actions: list[np.ndarray] = []
 
     def add(self, seen: dict[str, np.ndarray], action: np.ndarray) -> None:
         self.seen.append(numbers(seen, self.obs))
         if self.obs == "images":
             self.images.append(image(seen))
+            self.hidden.append(hidden(seen))
         self.actions.append(action)
 
     def extend(self, other: "Shown") -> None:
-        for name in ("seen", "images", "actions"):
+        for name in ("seen", "images", "hidden", "actions"):
             getattr(self, name).extend(getattr(other, name))
 
 
@@ -130,25 +143,40 @@ def demonstrate(env: gymnasium.Env, options: argparse.Namespace) -> Shown:
 
 
 def learn(policy: Policy, shown: Shown, options: argparse.Namespace) -> None:
-    """Fit a policy to what was shown, and print the learning curve."""
+    """Fit a policy to what was shown, and print the learning curve.
+
+    Beside its actions the eye of a policy learns to tell what images show of the plan and the
+    depth: the simulation knows that of each demonstration, and no policy is given it later.
+    """
     seen = torch.from_numpy(np.array(shown.seen, np.float32))
     actions = torch.from_numpy(np.array(shown.actions, np.float32))
     images = torch.from_numpy(np.array(shown.images)) if shown.images else None
     policy.mean.copy_(seen.mean(0))
     policy.scale.copy_(seen.std(0) + 1e-3)
-    optimizer = torch.optim.Adam(policy.parameters(), lr=1e-3)
-    slower = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, options.steps)
+    schedules, parameters = torch.optim.lr_scheduler, list(policy.parameters())
+    if images is None:
+        optimizer = torch.optim.Adam(parameters, lr=1e-3)
+        slower = schedules.CosineAnnealingLR(optimizer, options.steps)
+    else:
+        told = torch.from_numpy(np.array(shown.hidden, np.float32))
+        told = (told - told.mean(0)) / (told.std(0) + 1e-4)
+        teller = nn.Linear(N_LOOKED, told.shape[1])
+        optimizer = torch.optim.Adam([*parameters, *teller.parameters()])
+        slower = schedules.OneCycleLR(optimizer, 2e-3, options.steps)
     order = torch.Generator().manual_seed(options.seed)
     every, total = max(options.steps // 10, 1), 0.0
     for step in range(1, options.steps + 1):
         some = torch.randint(len(seen), (BATCH,), generator=order)
-        wanted = policy(seen[some], None if images is None else images[some])
-        loss = nn.functional.mse_loss(wanted, actions[some])
+        looked = None if images is None else policy.look(images[some].float() / 255.0)
+        error = nn.functional.mse_loss(policy.acted(seen[some], looked), actions[some])
+        loss = error
+        if looked is not None and told.shape[1]:
+            loss = error + TELLS * nn.functional.mse_loss(teller(looked), told[some])
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
         slower.step()
-        total += loss.item()
+        total += error.item()
         if step % every == 0:
             print(f"step {step}: error of an action {(total / every) ** 0.5:.4f}", flush=True)
             total = 0.0
