@@ -39,6 +39,10 @@ FORWARD = (0.0, 0.0, -1.0)
 """Direction that a blade calls forward, in the frame of the shaft: across the shaft and across the
 way of the jaws. A grasper is led as a blade is."""
 
+_ROUNDING = 1e-9
+"""Force that may be left of one that came and went [N]: some 1e-18, where tissue pushes with some
+1e-3."""
+
 _PARTS = ("shaft", *_JAWS)
 """Names of the bodies of a grasper."""
 
@@ -171,7 +175,7 @@ class Grasper:
         """Whether something between the pads pushes both jaws outwards."""
         across = self._axes[:, 0]
         _, low, high = (float(applied[:3] @ across) for applied in self._applied)
-        return low < 0.0 < high
+        return low < -_ROUNDING and high > _ROUNDING
 
     @property
     def wrench(self) -> Wrench:

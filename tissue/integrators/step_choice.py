@@ -54,8 +54,6 @@ class StepChoice(Arrays):
     """Steps that the body at rest would take for it."""
     strained: FloatCell
     """The last bound on w^2 of the tetrahedra as they are deformed [1/s2]."""
-    foreseen: FloatCell
-    """That bound where they were expected to be now, under laws that stiffen [1/s2]."""
     allowed: FloatCell
     """Up to which w^2 it was not brought near the truth [1/s2]."""
     moved: FloatCell
@@ -99,7 +97,6 @@ def new_step_choice(
         needed=0.0,
         at_rest=0.0,
         strained=0.0,
-        foreseen=0.0,
         allowed=0.0,
         moved=math.inf,
         resting=0.0,

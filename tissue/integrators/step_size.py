@@ -230,14 +230,13 @@ def _is_bound_known(choice: StepChoice, solid: Solid, limit: StepLimit) -> bool:
 def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLimit) -> None:
     """Bound the frequencies of the body as it is deformed.
 
-    Where the law stiffens as tissue is stretched, it is bounded where the nodes will be at the next
-    bound, too: an exponential law can double its modulus in two steps. Where the last bound has
-    foreseen the body as it is now, it is not evaluated there again. The Nystroem method
+    Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes will
+    be at the next one: an exponential law can double its modulus in two steps. The Nystroem method
     begins where the bound is evaluated, and its first stage shares the gradients. Position Verlet
     evaluated them last half a step before: where no tetrahedron has changed since, they are used.
     """
     elastic, body, visits = context.elastic, context.body, context.visits
-    solid, ahead = elastic.solid, 0.0
+    solid, strained = elastic.solid, 0.0
     keeps = keeps_gradients(solid)
     is_known = (
         keeps
@@ -245,30 +244,27 @@ def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLi
         and solid.is_bound_current == 1
         and not math.isinf(choice.moved)
     )
-    is_foreseen = solid.is_bound_current == 1 and not math.isinf(choice.moved)
-    found = choice.foreseen
     if stiffens(solid.law):
         highest = max(choice.least, choice.strained + limit.added)  # as it was last
         step = stable_step(choice.method, elastic, highest, choice.surroundings)
         if not math.isinf(step):  # every node is held
-            places, v = context.stages.last_positions, body.velocities
+            ahead, v = context.stages.last_positions, body.velocities
             seconds = STEPS_BETWEEN_STRAIN_BOUNDS * step
             for i in range(body.n_nodes):
-                store_point(places, i, point(body.positions, i) + times(seconds, point(v, i)))
+                store_point(ahead, i, point(body.positions, i) + times(seconds, point(v, i)))
             if keeps:
                 run_loop(context, DISPLACEMENTS_LAST, 0.0)
                 run_loop(context, GRADIENTS, 0.0)
                 _average(context)
-            ahead = strained_frequency(elastic, body, places, visits, limit, keeps)
+            strained = strained_frequency(elastic, body, ahead, visits, limit, keeps)
     if keeps and _GRADIENTS[choice.method] == OF_NEXT_STEP:
         run_loop(context, DISPLACEMENTS, 0.0)
         run_loop(context, GRADIENTS, 0.0)
         _average(context)
         solid.are_gradients_known = 1
         is_known = True
-    if not (stiffens(solid.law) and is_foreseen):
-        found = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
-    choice.strained, choice.foreseen = max(ahead, found), ahead
+    found = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
+    choice.strained = max(strained, found)
     choice.allowed = limit.allowed
     choice.moved = 0.0
     solid.is_bound_current = 1
