@@ -15,6 +15,9 @@ hypothesis.settings.register_profile("no deadline", deadline=None)
 hypothesis.settings.load_profile("no deadline")
 
 ROOT = Path(__file__).parents[2]
+PATIENCE = 60.0
+"""Time in which a process ends on a busy machine [s]."""
+
 SERVE_BLOCK = Path(__file__).with_name("tcp") / "serve_block.py"
 
 
@@ -36,7 +39,7 @@ class ServerProcess:
         if self.process.poll() is None:
             self.process.send_signal(number)
         try:
-            return self.process.wait(10)
+            return self.process.wait(PATIENCE)
         finally:
             self.process.kill()
             self.process.stdout.close()

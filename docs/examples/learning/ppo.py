@@ -1,7 +1,7 @@
 """Learn a task by trial and error, from state: proximal policy optimisation in one file.
 
     python ppo.py --task scalpel_sim/Incise-v0 --minutes 30
-    python ppo.py --demonstrations 30 --minutes 10
+    python ppo.py --demonstrations 30 --minutes 30
 
 The second line begins with a clone of the expert, and goes on by trial and error from there.
 After Schulman et al. 2017 (arXiv:1707.06347), with advantages of Schulman et al. 2016.
