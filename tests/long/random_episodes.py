@@ -35,7 +35,7 @@ N_REPEATED = 8
 
 
 class Round(NamedTuple):
-    """What a process has after a round of episodes."""
+    """Memory and objects of a process after a round of episodes."""
 
     memory: int
     """Memory in use [byte]."""
